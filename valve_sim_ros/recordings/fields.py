@@ -3,6 +3,7 @@
 """Numbers out of messages, by the type definitions the bag carries itself."""
 
 from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 import re
 from typing import Any
@@ -11,12 +12,20 @@ import numpy as np
 from rosbags.typesys import get_types_from_idl, get_types_from_msg, get_typestore, Stores
 
 from .errors import RecordingError
-from .messages import Definition
 from .quality import Array
 
 FLOAT64 = 'std_msgs/msg/Float64'
 STEP = re.compile(r'([A-Za-z_]\w*)((?:\[\d+\])*)')
 IDL_SEPARATOR = '=' * 80 + '\nIDL: '
+
+
+@dataclass(frozen=True)
+class Definition:
+    """The definition of a message type as a bag stores it; language is 'msg', 'idl' or ''."""
+
+    msgtype: str
+    language: str
+    text: str
 
 
 class Decoder:

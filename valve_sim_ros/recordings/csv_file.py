@@ -1,0 +1,129 @@
+# Copyright 2026 The valve_sim_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Recordings as CSV: a header with t, u and any of p1, p2, x, comment lines after #."""
+
+import csv
+import hashlib
+import os
+from pathlib import Path
+
+import numpy as np
+
+from .errors import RecordingError
+from .quality import Array
+from .recording import Provenance, Recording, refuse_not_finite, SIGNALS
+from .topics import chosen, Topics
+
+
+def read_csv(path: str | os.PathLike[str], topics: Topics | None = None) -> Recording:
+    """Read a CSV file with columns t [s], u and any of p1, p2, x [% of span], in any order.
+
+    An empty cell of an output is a lost sample. `topics` renames columns.
+
+    Raises
+    ------
+    RecordingError
+        With the line, if the file is no such table or its numbers cannot be used.
+    """
+    path = Path(path)
+    try:
+        content = path.read_bytes()
+        lines = content.decode('utf-8-sig').splitlines()
+    except OSError as error:
+        raise RecordingError(f'{path}: cannot be read ({error.strerror})') from None
+    except UnicodeDecodeError as error:
+        raise RecordingError(f'{path}: not a text file ({error})') from None
+    comments = tuple(line.lstrip('# ') for line in lines if line.startswith('#'))
+    rows = [(n, line) for n, line in enumerate(lines, 1) if line.strip() and line[0] != '#']
+    if not rows:
+        raise RecordingError(f'{path}: empty; expected a header "t,u,x" and numbers below it')
+    header = [cell.split('[')[0].strip() for cell in next(csv.reader([rows[0][1]]))]
+    columns = _columns(path, header, topics)
+    table = _table(path, rows, len(header))
+    signals = {}
+    for name, (index, scale, offset) in columns.items():
+        signals[name] = table[:, index] * scale + offset
+    time = table[:, header.index('t')]
+    try:
+        refuse_not_finite('t', time, np.arange(time.size, dtype=float))
+        for name, values in signals.items():
+            lost = np.isnan(values) & _empty(rows, header, columns[name][0])
+            if name == 'u':
+                refuse_not_finite(name, values, time)
+            else:
+                refuse_not_finite(name, np.where(lost, 0.0, values), time)
+        return Recording(
+            time=time - time[0],
+            **signals,
+            provenance=Provenance(
+                paths=(str(path),),
+                digests={str(path): hashlib.sha256(content).hexdigest()},
+                topics={name: header[index] for name, (index, _, _) in columns.items()},
+                time_source='column t',
+                storage='csv',
+                comments=comments,
+            ),
+        )
+    except RecordingError as error:
+        raise RecordingError(f'{path}: {error}') from None
+
+
+def write_csv(recording: Recording, path: str | os.PathLike[str]) -> None:
+    """Write columns t,u,p1,p2,x (those there are), exactly, aside first and then renamed."""
+    path = Path(path)
+    names = ('u', *recording.signals)
+    columns = [recording.time, *(getattr(recording, name) for name in names)]
+    aside = path.with_name(f'.{path.name}.part')
+    with aside.open('w', newline='', encoding='utf-8') as file:
+        writer = csv.writer(file, lineterminator='\n')
+        writer.writerow(('t', *names))
+        for row in zip(*columns, strict=True):
+            writer.writerow(['' if value != value else repr(float(value)) for value in row])
+    os.replace(aside, path)
+
+
+def _columns(
+    path: Path, header: list[str], topics: Topics | None
+) -> dict[str, tuple[int, float, float]]:
+    """Return index, scale and offset of the column of each signal."""
+    selections = chosen(topics)
+    names = {name: selections[name].topic.lstrip('/') if name in selections else name for name in SIGNALS}
+    missing = [names[s] for s in selections if names[s] not in header]
+    missing += [name for name in ('t', names['u']) if name not in header]
+    if missing:
+        raise RecordingError(
+            f'{path}: no column {missing[0]!r}; it has {", ".join(header)}; expected t, u and any '
+            'of p1, p2, x (say which with --topic x=COLUMN)'
+        )
+    return {
+        signal: (
+            header.index(name),
+            selections[signal].scale if signal in selections else 1.0,
+            selections[signal].offset if signal in selections else 0.0,
+        )
+        for signal, name in names.items()
+        if name in header
+    }
+
+
+def _table(path: Path, rows: list[tuple[int, str]], width: int) -> Array:
+    """Return the numbers below the header, NaN for empty cells."""
+    if len(rows) < 2:
+        raise RecordingError(f'{path}: a header without samples; record again')
+    table = np.empty((len(rows) - 1, width))
+    for row, (number, line) in zip(table, rows[1:], strict=True):
+        cells = line.split(',')
+        if len(cells) != width:
+            raise RecordingError(
+                f'{path}, line {number}: {len(cells)} cells, the header has {width} columns'
+            )
+        try:
+            row[:] = [float(cell) if cell.strip() else np.nan for cell in cells]
+        except ValueError as error:
+            raise RecordingError(f'{path}, line {number}: {error}; expected numbers') from None
+    return table
+
+
+def _empty(rows: list[tuple[int, str]], header: list[str], index: int) -> np.ndarray:
+    """Tell which cells of a column are empty, as opposed to NaN."""
+    return np.array([not line.split(',')[index].strip() for _, line in rows[1:]])
