@@ -157,14 +157,15 @@ def first_stop(
 ) -> tuple[float, bool]:
     """Return when the slip ends within `left` seconds (-1 if it does not), and its arming.
 
-    The speed is a sum of at most four exponentials, or a decaying oscillation: a scan with steps
-    that grow with the surviving time constants brackets the first zero, bisection finds it.
+    The speed is a sum of at most four exponentials, each of which acts about its own time
+    constant, or a decaying oscillation: a scan with steps that grow with the time since the start,
+    or of an eighth of a period, brackets the first zero and bisection finds it.
     """
+    growth = 1.5
     if poles.regime == UNDERDAMPED:
-        step = longest = 0.25 * math.pi / poles.second
+        step, growth = 0.25 * math.pi / poles.second, 1.0
     else:
-        step = -0.25 / poles.second
-        longest = 0.25 / max(-poles.first, slip.rate)
+        step = 0.25 / max(-poles.second, slip.rate)
     start = 0.0
     while start < left:
         end = min(start + step, left)
@@ -180,7 +181,7 @@ def first_stop(
             return end, armed
         armed = armed or speed > delta
         start = end
-        step = max(min(1.5 * step, longest), step)
+        step *= growth
     return -1.0, armed
 
 
