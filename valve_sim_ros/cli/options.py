@@ -2,9 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Options that several verbs share."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from collections.abc import Iterator
 from typing import Any
 
 import click
@@ -34,7 +33,10 @@ def topics_by_signal(topics: Sequence[str]) -> dict[str, str]:
 def progress_bar() -> Iterator[Callable[[float, str], None]]:
     """Show a bar with the time left on a terminal, nothing elsewhere."""
     with tqdm(
-        total=1.0, disable=None, leave=False, bar_format='{desc} {percentage:3.0f} %|{bar}| {remaining}'
+        total=1.0,
+        disable=None,
+        leave=False,
+        bar_format='{desc} {percentage:3.0f} %|{bar}| {remaining}',
     ) as bar:
 
         def report(share: float, text: str) -> None:

@@ -99,7 +99,9 @@ def identify(
     )
 
 
-def _eta(problem: Problem, outputs: list[Array], counts: list[Array] | None = None) -> dict[str, float]:
+def _eta(
+    problem: Problem, outputs: list[Array], counts: list[Array] | None = None
+) -> dict[str, float]:
     """Return eta by signal over the samples that count."""
     etas = {}
     for name in problem.signals:

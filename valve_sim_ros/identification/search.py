@@ -81,9 +81,7 @@ def _global(problem: Problem, point: Array, signal: str, unknowns: list[int], se
     return best
 
 
-def polish(
-    problem: Problem, point: Array, ratios: tuple[float, ...] = ()
-) -> tuple[Array, Array]:
+def polish(problem: Problem, point: Array, ratios: tuple[float, ...] = ()) -> tuple[Array, Array]:
     """Polish all unknowns on all signals, from `point` and from it with other stem speeds.
 
     Returns what `search` does.

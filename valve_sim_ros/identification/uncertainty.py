@@ -82,7 +82,9 @@ def _physical(problem: Problem, point: Array) -> list[float]:
 
 def _verdict(name: str, value: float, half: float, share: float) -> str:
     """Say in words how well one value is known."""
-    if (share < 1e-4 or share > 1.0 - 1e-4) and not (name in ('f_d1', 'f_s', 'f_d') and share < 0.5):
+    if (share < 1e-4 or share > 1.0 - 1e-4) and not (
+        name in ('f_d1', 'f_s', 'f_d') and share < 0.5
+    ):
         return 'at the bound of its range: not identified by this data, or the model does not fit'
     relative = half / value if value > 0.0 else float('inf')
     if relative <= IDENTIFIED or (name in ('f_d1', 'f_s', 'f_d') and half <= SMALL):

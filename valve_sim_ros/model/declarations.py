@@ -98,7 +98,5 @@ class Option:
     def checked(self, value: object) -> str:
         """Return `value` if it is one of the choices, else raise a ModelError."""
         if value not in self.choices:
-            raise ModelError(
-                f'{self.name} = {value!r}: expected one of {", ".join(self.choices)}'
-            )
+            raise ModelError(f'{self.name} = {value!r}: expected one of {", ".join(self.choices)}')
         return str(value)

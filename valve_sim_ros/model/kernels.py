@@ -41,14 +41,15 @@ def remake(function: Any, make: Callable[..., Any], slots: dict[str, Any]) -> An
     make : callable
         Turns each Python function into what shall be called: `njit`, or the identity.
     slots : dict
-        Functions to put in the place of those of the same name.
+        Plain functions to put in the place of those of the same name.
     """
     source = function.py_func
     space = dict(source.__globals__)
     for name in source.__code__.co_names:
-        called = slots.get(name, space.get(name))
-        if isinstance(called, Dispatcher):
-            space[name] = remake(called, make, slots)
+        if name in slots:
+            space[name] = make(slots[name])
+        elif isinstance(space.get(name), Dispatcher):
+            space[name] = remake(space[name], make, slots)
     return make(FunctionType(source.__code__, space, source.__name__, source.__defaults__))
 
 

@@ -114,7 +114,11 @@ def advance(
     inlet = tubing_slot(p1_held, state, extras, memory, dt)
     if is_filling(inlet, p1, p2, theta[PRINTED] != 0.0):
         nominal = 1.0 / theta[T_G1]
-        decay, gain, stem_rate = transition[FILL_DECAY], transition[FILL_GAIN], transition[FILL_RATE]
+        decay, gain, stem_rate = (
+            transition[FILL_DECAY],
+            transition[FILL_GAIN],
+            transition[FILL_RATE],
+        )
     else:
         nominal = 1.0 / theta[T_G2]
         decay = transition[EMPTY_DECAY]

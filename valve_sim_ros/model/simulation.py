@@ -101,7 +101,9 @@ def simulate(
     Stages are eq. (1), (5) and (10) of *A semi-physical model for pneumatic control valves*
     (2016), the stem solved exactly between events.
     """
-    spec = parameters if isinstance(parameters, ValveSpec) else ValveSpec().changed(parameters or {})
+    spec = (
+        parameters if isinstance(parameters, ValveSpec) else ValveSpec().changed(parameters or {})
+    )
     command = _vector(u, 'u')
     if time is None:
         dt = np.array([SAMPLE_TIME.checked(sample_time)])

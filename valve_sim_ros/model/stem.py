@@ -139,7 +139,13 @@ def speed_at(tau: float, slip: Slip, poles: Poles) -> float:
 
 @njit
 def surely_moving(
-    slip: Slip, direction: float, delta: float, decay: float, phi1: float, phi2: float, poles: Poles
+    slip: Slip,
+    direction: float,
+    delta: float,
+    decay: float,
+    phi1: float,
+    phi2: float,
+    poles: Poles,
 ) -> bool:
     """Tell whether a lower bound of the speed over the whole interval stays above delta."""
     push = -direction * slip.rate * slip.forced

@@ -6,14 +6,19 @@ from collections.abc import Callable, Sequence
 import sys
 
 import rclpy
-from rclpy.exceptions import InvalidParameterException, InvalidParameterTypeException
-from rclpy.exceptions import InvalidParameterValueException
+from rclpy._rclpy_pybind11 import RCLError  # rclpy exports it nowhere else
+from rclpy.exceptions import (
+    InvalidParameterException,
+    InvalidParameterTypeException,
+    InvalidParameterValueException,
+)
 from rclpy.executors import ExternalShutdownException
 from rclpy.experimental import EventsExecutor
 from rclpy.node import Node
 
 REFUSALS = (
     ValueError,
+    RCLError,  # e.g. a parameter file that is missing or no YAML
     InvalidParameterException,
     InvalidParameterTypeException,
     InvalidParameterValueException,
@@ -40,9 +45,7 @@ def spin(node: Node) -> None:
         executor.shutdown()
 
 
-def run(
-    make: Callable[[], Node], args: Sequence[str] | None = None, once: bool = False
-) -> int:
+def run(make: Callable[[], Node], args: Sequence[str] | None = None, once: bool = False) -> int:
     """Make a node, spin it (not at all if `once`), and end in the order that never aborts.
 
     Returns

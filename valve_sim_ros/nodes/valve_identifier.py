@@ -133,6 +133,9 @@ class ValveIdentifier(Node):
         except ValueError as error:
             self.get_logger().error(str(error))
             response.success, response.message = False, str(error)
+        except (KeyboardInterrupt, ExternalShutdownException):
+            # let past the executor, it would be printed with its traceback
+            response.success, response.message = False, 'ended before the fit was done'
         else:
             response.success, response.message = True, f'eta = {result.eta:.4f} %'
         return response

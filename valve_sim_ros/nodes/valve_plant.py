@@ -13,7 +13,7 @@ from std_msgs.msg import Float64
 from ..model.simulation import Valve
 from ..model.spec import ValveSpec
 from .parameters import INITIAL_COMMAND, ValveParameters
-from .spinning import run
+from .spinning import RCLError, run
 
 QUEUE = 10
 REPORT_PERIOD = 10.0
@@ -36,12 +36,12 @@ class ValvePlant(Node):
     def __init__(self, **options: Any) -> None:
         """Declare the parameters and connect; `options` go to rclpy's Node."""
         super().__init__('valve_plant', **options)
-        self._parameters = ValveParameters(self, self._apply)
-        self.sample_time = self._parameters.fixed['sample_time']
-        self.command = self._parameters.fixed[INITIAL_COMMAND.name]
+        self._valve_parameters = ValveParameters(self, self._apply)
+        self.sample_time = self._valve_parameters.fixed['sample_time']
+        self.command = self._valve_parameters.fixed[INITIAL_COMMAND.name]
         self.refused_commands = self.clamped_commands = self.missed_periods = 0
         self._last_tick: int | None = None
-        self._valve = Valve(self._parameters.spec)
+        self._valve = Valve(self._valve_parameters.spec)
         self._outputs = [self.create_publisher(Float64, name, QUEUE) for name in ('p1', 'p2', 'x')]
         self.create_subscription(Float64, 'u', self._receive, QUEUE)
         self.create_timer(self.sample_time, self._tick)
@@ -89,7 +89,11 @@ class ValvePlant(Node):
                     throttle_duration_sec=REPORT_PERIOD,
                 )
         self._last_tick = now
-        self.step()
+        try:
+            self.step()
+        except RCLError:
+            if self.context.ok():  # otherwise a signal came between two publications
+                raise
 
 
 def main(args: Sequence[str] | None = None) -> None:

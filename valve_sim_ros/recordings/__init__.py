@@ -11,7 +11,7 @@ from .errors import RecordingError
 from .recording import Recording
 from .topics import Topics
 
-__all__ = ['read_commands', 'read_recording', 'Recording', 'RecordingError', 'write_recording']
+__all__ = ['Recording', 'RecordingError', 'read_commands', 'read_recording', 'write_recording']
 
 
 def read_recording(path: str | os.PathLike[str], topics: Topics | None = None) -> Recording:

@@ -55,7 +55,9 @@ def align(arrivals: Mapping[str, Arrivals], provenance: Provenance) -> Recording
     if not regular:
         ticks = np.arange(seconds[reference].size)
     rows = _rows(ticks)
-    stamps = np.interp(rows, ticks, seconds[reference])  # when each sample was, or would have been, seen
+    stamps = np.interp(
+        rows, ticks, seconds[reference]
+    )  # when each sample was, or would have been, seen
     time = (rows - rows[0]) * period if regular else stamps
     signals, found = {}, {}
     for name in outputs:
@@ -150,9 +152,7 @@ def _rows(ticks: npt.NDArray[np.int64]) -> npt.NDArray[np.int64]:
     return rows
 
 
-def _place(
-    stamps: Array, values: Array, ticks: Array, period: float
-) -> tuple[Array, int, float]:
+def _place(stamps: Array, values: Array, ticks: Array, period: float) -> tuple[Array, int, float]:
     """Give each value the nearest tick; return the column, the surplus and the offset [s]."""
     nearest = _nearest(ticks, stamps)
     offset = float(np.median(stamps - ticks[nearest]))

@@ -81,7 +81,9 @@ def read_bag(
         decoder = Decoder(d for d in definitions.values() if d.language)
         arrivals = {}
         for name, chosen in selections.items():
-            raw = decoder.values(payloads[chosen.topic], types[chosen.topic], chosen.field, chosen.topic)
+            raw = decoder.values(
+                payloads[chosen.topic], types[chosen.topic], chosen.field, chosen.topic
+            )
             values = chosen.scale * raw + chosen.offset
             received = np.array(stamps[chosen.topic], dtype=np.int64)
             refuse_not_finite(name, values, (received - received[0]) * 1e-9)
@@ -90,7 +92,9 @@ def read_bag(
             a.stamps.size for name, a in arrivals.items() if name != 'u' or len(arrivals) == 1
         )
         if messages < FEWEST_MESSAGES:
-            raise RecordingError(f'only {messages} messages per output; record at least 10 samples')
+            raise RecordingError(
+                f'only {messages} messages per output; record at least 10 samples'
+            )
         return align(
             arrivals,
             Provenance(
@@ -106,9 +110,7 @@ def read_bag(
         raise RecordingError(f'{path}: {error}') from None
 
 
-def write_bag(
-    recording: Recording, path: str | os.PathLike[str], storage: str = 'mcap'
-) -> None:
+def write_bag(recording: Recording, path: str | os.PathLike[str], storage: str = 'mcap') -> None:
     """Write u and the measured outputs as std_msgs/msg/Float64 topics /u, /p1, /p2, /x.
 
     Parameters

@@ -87,7 +87,10 @@ def _columns(
 ) -> dict[str, tuple[int, float, float]]:
     """Return index, scale and offset of the column of each signal."""
     selections = chosen(topics)
-    names = {name: selections[name].topic.lstrip('/') if name in selections else name for name in SIGNALS}
+    names = {
+        name: selections[name].topic.lstrip('/') if name in selections else name
+        for name in SIGNALS
+    }
     missing = [names[s] for s in selections if names[s] not in header]
     missing += [name for name in ('t', names['u']) if name not in header]
     if missing:

@@ -110,7 +110,11 @@ class Decoder:
             shown = ', '.join(fields[:12]) + (', …' if len(fields) > 12 else '')
             raise RecordingError(
                 f'topic {topic} has type {msgtype}, which has no number {path!r}; '
-                + (f'its numbers are {shown}: write {topic}.{fields[0]}' if fields else 'it holds none')
+                + (
+                    f'its numbers are {shown}: write {topic}.{fields[0]}'
+                    if fields
+                    else 'it holds none'
+                )
             )
         steps: list[str | int] = []
         for step in path.split('.'):

@@ -176,7 +176,9 @@ class Recording:
         n = self.time.size
         for name, values in self._present().items():
             if values.size != n:
-                raise RecordingError(f'{name} has {values.size} values, time has {n}: expected as many')
+                raise RecordingError(
+                    f'{name} has {values.size} values, time has {n}: expected as many'
+                )
         if not np.isfinite(self.time).all():
             raise RecordingError('time is not finite everywhere: expected seconds from 0')
         backward = np.flatnonzero(np.diff(self.time) <= 0)

@@ -78,7 +78,9 @@ class TopicSelection:
             raise RecordingError(f'no topic {wanted} in the bag; {listing(names, wanted)}')
         topic = max(fitting, key=len)
         rest = wanted[len(topic) + 1 :].replace('/', '.')
-        return replace(self, topic=topic, field=rest if self.field == 'data' else f'{rest}.{self.field}')
+        return replace(
+            self, topic=topic, field=rest if self.field == 'data' else f'{rest}.{self.field}'
+        )
 
     def text(self) -> str:
         """Return the selection in the form that `parse` reads."""

@@ -30,7 +30,9 @@ def draw_fit(result: Identification, path: str | os.PathLike[str]) -> None:
     path = Path(path)
     recording, fitted = result.recordings[0], result.fitted[0]
     figure = Figure(figsize=(10, 8), layout='constrained')
-    for axes, (name, label) in zip(figure.subplots(4, 1, sharex=True), LABELS.items(), strict=True):
+    for axes, (name, label) in zip(
+        figure.subplots(4, 1, sharex=True), LABELS.items(), strict=True
+    ):
         if name == 'u':
             axes.step(recording.time, recording.u, where='post', color='black', label='command')
         else:
