@@ -101,7 +101,8 @@ def test_plant_to_recording_to_plant(ros):
     plant.step = lambda: (used.append(plant.command), step())
     for level in levels:
         peer.u.publish(Float64(data=level))
-        until(lambda n=len(used): len(used) >= n + 40)
+        goal = len(used) + 40
+        until(lambda goal=goal: len(used) >= goal)
     count = len(used)
     until(lambda: all(len(values) >= count for values in peer.heard.values()))
     heard = {
@@ -187,7 +188,7 @@ def test_ends_silently_under_a_namespace_with_a_file(ros, tmp_path, number):
 )
 def test_a_bad_start_ends_with_a_sentence(setting, words):
     process = run_plant('--ros-args', '-p', setting)
-    out, err = process.communicate(timeout=30)
+    _, err = process.communicate(timeout=30)
     assert process.returncode == 1
     assert words in err
     assert 'Traceback' not in err

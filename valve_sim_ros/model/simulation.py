@@ -119,7 +119,8 @@ def simulate(
     outputs = np.empty((3, command.size))
     state = (initial or InitialState()).array()
     kernels.run(command, dt, state, spec.theta, NOTHING, NOTHING, outputs)
-    return Simulation(t, command, *outputs, spec)
+    p1, p2, x = outputs
+    return Simulation(t, command, p1, p2, x, spec)
 
 
 def _vector(values: npt.ArrayLike, name: str) -> Array:

@@ -38,7 +38,7 @@ class Stem(NamedTuple):
 
 
 class Friction(NamedTuple):
-    """Static and dynamic friction levels, opening and closing, and relative stiffness [%, %, -]."""
+    """Friction levels, opening and closing [%], and relative stiffness of the spring."""
 
     static_up: float
     static_down: float
@@ -95,7 +95,12 @@ def forced_gain(rate: float, a_1: float, a_2: float, stiffness: float) -> tuple[
 
 @njit
 def begin_slip(
-    stem: Stem, target: float, excess: float, friction: Friction, forced: tuple, poles: Poles
+    stem: Stem,
+    target: float,
+    excess: float,
+    friction: Friction,
+    forced: tuple[float, float],
+    poles: Poles,
 ) -> Slip:
     """Fit the closed form of a slip to the stem's position and speed at its start."""
     gain, rate = forced
@@ -199,7 +204,7 @@ def stem_step(
     duration: float,
     friction: Friction,
     delta: float,
-    forced: tuple,
+    forced: tuple[float, float],
     poles: Poles,
     decay: float,
     phi1: float,
@@ -229,7 +234,7 @@ def stem_step(
     -------
     Stem
     """
-    gain, rate = forced
+    rate = forced[1]
     left = duration
     for _ in range(MAX_EVENTS):
         if stem.direction == 0.0:

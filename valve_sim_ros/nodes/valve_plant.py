@@ -7,13 +7,14 @@ import math
 import sys
 from typing import Any
 
+from rclpy._rclpy_pybind11 import RCLError  # rclpy exports it nowhere else
 from rclpy.node import Node
 from std_msgs.msg import Float64
 
 from ..model.simulation import Valve
 from ..model.spec import ValveSpec
 from .parameters import INITIAL_COMMAND, ValveParameters
-from .spinning import RCLError, run
+from .spinning import run
 
 QUEUE = 10
 REPORT_PERIOD = 10.0

@@ -1,6 +1,6 @@
 # Copyright 2026 The valve_sim_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Un-stamped topics on one time axis: which tick of the valve does each message belong to?
+"""Un-stamped topics on one time axis: each message finds the tick of the valve it belongs to.
 
 The valve publishes its outputs on a timer, so their receive stamps lie near a regular grid. The
 grid is fitted robustly, each message goes to its tick, ticks without a message are lost (NaN) and
@@ -48,16 +48,17 @@ def align(arrivals: Mapping[str, Arrivals], provenance: Provenance) -> Recording
     outputs = [name for name in ordered if name != 'u']
     reference = max(outputs or ['u'], key=lambda name: ordered[name].stamps.size)
     origin = int(ordered[reference].stamps[0])
-    seconds = {name: (each.stamps - origin) * 1e-9 for name, each in ordered.items()}
+    seconds: dict[str, Array] = {
+        name: np.asarray((each.stamps - origin) * 1e-9, dtype=np.float64)
+        for name, each in ordered.items()
+    }
     ticks, fitted, jitter = _grid(seconds[reference])
     regular = jitter <= LARGEST_JITTER * fitted
     period = _nominal(fitted)
     if not regular:
         ticks = np.arange(seconds[reference].size)
     rows = _rows(ticks)
-    stamps = np.interp(
-        rows, ticks, seconds[reference]
-    )  # when each sample was, or would have been, seen
+    stamps = np.interp(rows, ticks, seconds[reference])
     time = (rows - rows[0]) * period if regular else stamps
     signals, found = {}, {}
     for name in outputs:

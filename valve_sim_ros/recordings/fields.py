@@ -94,7 +94,7 @@ class Decoder:
             return self._store.deserialize_cdr(payload, msgtype)
         except Exception as error:  # a damaged payload raises anything
             raise RecordingError(
-                f'message {k} of {topic} is damaged or is no {msgtype} ({error}): record it again, '
+                f'message {k} of {topic} is damaged or is no {msgtype} ({error}): record again, '
                 'or leave the topic out'
             ) from error
 
@@ -102,8 +102,8 @@ class Decoder:
         """Return a function that follows `path` in a message, after checking it by type."""
         if msgtype not in self._store.fielddefs:
             raise RecordingError(
-                f'topic {topic} has type {msgtype}, which the bag does not define: give the folder '
-                'with its .msg files (--msg-dir)'
+                f'topic {topic} has type {msgtype}, which the bag does not define: record '
+                'it again as mcap, which carries the definitions'
             )
         fields = self.numeric_fields(msgtype)
         if re.sub(r'\[\d+\]', '[]', path) not in [re.sub(r'\[\d*\]', '[]', f) for f in fields]:

@@ -115,9 +115,6 @@ class Quality:
         By signal, u included.
     head_trimmed : int
         Samples dropped because no command was known yet.
-    command_shift : float
-        Commands stamped up to this long after a sample [s] are taken to have acted on it
-        (negative: they needed to come that much earlier).
     ambiguous_commands : int
         Commands so close to a tick that their sample is in doubt.
     notes : tuple of str
@@ -132,7 +129,6 @@ class Quality:
     gaps: tuple[Gap, ...] = ()
     signals: Mapping[str, SignalQuality] = field(default_factory=dict)
     head_trimmed: int = 0
-    command_shift: float = 0.0
     ambiguous_commands: int = 0
     notes: tuple[str, ...] = ()
 
@@ -159,15 +155,10 @@ class Quality:
         lines += [f'gap: {gap.text()}' for gap in self.gaps]
         if self.head_trimmed:
             lines.append(f'{self.head_trimmed} samples before the first command left out')
-        if self.command_shift:
-            lines.append(
-                f'commands count for a sample when stamped up to {milliseconds(self.command_shift)}'
-                ' after it: the outputs say so'
-            )
         if self.ambiguous_commands:
             lines.append(
-                f'{self.ambiguous_commands} commands lie so close to a sample that they may belong '
-                'to its neighbour'
+                f'{self.ambiguous_commands} commands lie so close to a sample that they may '
+                'belong to its neighbour'
             )
         return lines + list(self.notes)
 

@@ -4,6 +4,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
@@ -125,7 +126,7 @@ class Recording:
         """The runs of samples without a gap, in order."""
         ends = np.flatnonzero(np.diff(self.time) > self._longest_step) + 1
         bounds = [0, *ends.tolist(), len(self)]
-        return [slice(a, b) for a, b in zip(bounds, bounds[1:], strict=False) if b > a]
+        return [slice(a, b) for a, b in pairwise(bounds) if b > a]
 
     def output(self, name: str) -> Array:
         """Return the output `name`; RecordingError if it was not measured."""

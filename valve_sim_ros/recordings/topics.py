@@ -195,6 +195,6 @@ def _refuse_silent(signal: str, topic: str, available: Mapping[str, int]) -> Non
     """Raise a RecordingError for a topic without messages."""
     if not available[topic]:
         raise RecordingError(
-            f'topic {topic} for {signal} is in the bag but holds no message: record it again while '
+            f'topic {topic} for {signal} is in the bag but holds no message: record it while '
             'the valve runs, or choose another topic'
         )
