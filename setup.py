@@ -53,8 +53,6 @@ setup(
         'scipy>=1.11',  # global search and least squares
         'numba>=0.58',  # the compiled step
         'rosbags>=0.11.9',  # bags without a ROS installation
-        'lz4>=4.3.3',  # packed chunks of damaged bags; rosbags needs it too
-        'backports.zstd>=1.0.0; python_version < "3.14"',  # the same; rosbags needs it too
         'PyYAML>=6.0.1',  # ROS parameter files
         'click>=8.1',  # command line
         'tqdm>=4.66',  # progress

@@ -63,6 +63,11 @@ def assess(problem: Problem, point: Array, jacobian: Array) -> dict[str, Estimat
         estimates[name] = Estimate(
             base[index], half, _verdict(name, base[index], half, float(point[index]))
         )
+    static = estimates['f_s']
+    if 'not identified' in static.verdict:
+        # f_d is searched as a share of f_s: it cannot be known better than that
+        half = max(estimates['f_d'].half_width, static.half_width)
+        estimates['f_d'] = Estimate(estimates['f_d'].value, half, static.verdict)
     ratio = estimates['a_1/a_2']
     for name, value in (('a_1', A_1_HELD), ('a_2', A_1_HELD / base[RATIO])):
         estimates[name] = Estimate(
