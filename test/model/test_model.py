@@ -7,6 +7,7 @@ from pathlib import Path
 
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from numba import njit
 import numpy as np
 import pytest
 
@@ -111,10 +112,9 @@ def test_record_and_single_steps_are_equal_to_the_bit():
 def test_interpreted_steps_agree():
     u = random_record()
     s = simulate(u)
-    advance = kernels.interpreted(pipeline.advance)
-    state, theta = [0.0] * pipeline.STATE_SIZE, ValveSpec().theta.tolist()
-    transition = [math.nan] * pipeline.TRANSITION_SIZE
-    x = [advance(v, 0.2 if k else 0.0, state, theta, transition, (), ()) for k, v in enumerate(u)]
+    step = kernels.make().interpreted
+    state, theta = InitialState().array(ValveSpec()).tolist(), ValveSpec().theta.tolist()
+    x = [step(v, 0.2 if k else 0.0, state, theta, math.inf, (), ()) for k, v in enumerate(u)]
     np.testing.assert_allclose(x, s.x, rtol=0, atol=1e-12)
 
 
@@ -140,21 +140,25 @@ def test_printed_branch_differs_only_a_little():
 
 
 def test_a_slot_takes_an_effect():
-    def twice(value, state, extras, memory, dt):
+    @njit
+    def twice(value, state, effects, memory, dt):
         return 2.0 * value
 
-    arguments = [30.0, 0.0, [0.0] * 6, ValveSpec().theta.tolist(), [math.nan] * 12, (), ()]
-    plugged = kernels.interpreted(pipeline.advance, {'command_slot': twice})
-    plugged(*arguments)
-    assert arguments[2][pipeline.P1] == pytest.approx(60.0 - 1.7647)
-    assert {
+    for make in (kernels.interpreted, lambda *how: kernels.kept(*how, 'test')):
+        state = InitialState().array(ValveSpec())
+        make(pipeline.step, {'command_slot': twice})(
+            30.0, 0.0, state, ValveSpec().theta, math.inf, (), ()
+        )
+        assert state[0] == pytest.approx(60.0 - 1.7647)
+    assert set(kernels.SLOTS) == {
         'command_slot',
         'inlet_slot',
         'tubing_slot',
         'flow_slot',
         'force_slot',
+        'motion_slot',
         'sensor_slot',
-    } == set(kernels.SLOTS)
+    }
 
 
 @given(LEVEL, LEVEL, st.floats(0.0, 30.0))

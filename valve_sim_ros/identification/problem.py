@@ -8,10 +8,11 @@ import math
 
 import numpy as np
 
-from ..model import kernels, pipeline
+from ..model import pipeline
+from ..model.kernels import make
 from ..model.parameters import BASE
 from ..model.pipeline import Array
-from ..model.simulation import InitialState, NOTHING
+from ..model.simulation import InitialState, NO_EFFECTS
 from ..model.spec import ValveSpec
 from ..recordings.recording import OUTPUTS, Recording
 from .errors import IdentificationError
@@ -113,15 +114,23 @@ class Problem:
     def simulate(self, point: Array) -> list[Array]:
         """Return p1, p2, x, shape (3, n), for each stretch."""
         values = self.values(point)
-        theta = np.empty(pipeline.THETA_SIZE)
-        theta[: pipeline.PRINTED] = [values.get(p.name, p.default) for p in BASE]
-        theta[pipeline.PRINTED] = float(self.branch == 'printed')
+        spec = ValveSpec(values, self.branch)
+        theta = spec.theta
         shares = dict(zip(self.nuisances, 2.0 * point[len(UNKNOWNS) :] - 1.0, strict=True))
         outputs = []
         for index, stretch in enumerate(self.stretches):
-            state = self._start(index, stretch, values, shares).array()
+            state = self._start(index, stretch, values, shares).array(spec)
             result = np.empty((3, stretch.u.size))
-            kernels.run(stretch.u, stretch.dt, state, theta, NOTHING, NOTHING, result)
+            make().run(
+                stretch.u,
+                stretch.dt,
+                state,
+                theta,
+                pipeline.BASE_STEP,
+                NO_EFFECTS,
+                NO_EFFECTS,
+                result,
+            )
             outputs.append(result)
         return outputs
 

@@ -2,10 +2,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """What it takes to declare a parameter or an option of the model, once."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 import math
 from numbers import Real
-from typing import Literal
+from typing import Any, Literal
 
 from .errors import ModelError
 
@@ -100,3 +101,69 @@ class Option:
         if value not in self.choices:
             raise ModelError(f'{self.name} = {value!r}: expected one of {", ".join(self.choices)}')
         return str(value)
+
+
+@dataclass(frozen=True)
+class EffectParameter(Parameter):
+    """A parameter of an effect; the effect is absent while all have their neutral value."""
+
+    neutral: float = 0.0
+
+    def __post_init__(self) -> None:
+        """Refuse a neutral value that is not legal."""
+        super().__post_init__()
+        self.checked(self.neutral)
+
+
+@dataclass(frozen=True)
+class Effect:
+    """A physical effect that the base valve lacks.
+
+    Attributes
+    ----------
+    id : str
+        Public name, as in the catalogue.
+    title : str
+        Plain name for reports.
+    stage : {'u-p1', 'p1-p2', 'p2-x', 'sensor'}
+        Where in the flow it acts.
+    parameters : tuple of EffectParameter
+        Names without the id; elsewhere they are called ``id.name``.
+    slots : mapping of str to numba function
+        Which slots of the pipeline it fills, `f(value, state, p, memory, dt) -> value` with its
+        own parameters as the tuple p and its own part of the memory.
+    explanation, symptom, confirm : str
+        What it is, what it does to the signals, and the test or topic that proves it.
+    memory : int
+        Numbers it must remember from sample to sample.
+    longest_step : float
+        Longest step inside a sample for which its form is accurate [s].
+    order : int
+        Place along the signal path among the effects of one slot.
+    twins : mapping of str to str
+        Effects that look alike, each with what tells them apart.
+    variants : tuple of tuple of str
+        Alternative sets of parameters for a search to free; one set with all by default.
+    references : tuple of str
+        Where the physics comes from.
+    """
+
+    id: str
+    title: str
+    stage: Literal['u-p1', 'p1-p2', 'p2-x', 'sensor']
+    parameters: tuple[EffectParameter, ...]
+    slots: Mapping[str, Any]
+    explanation: str
+    symptom: str
+    confirm: str
+    memory: int = 0
+    longest_step: float = math.inf
+    order: int = 0
+    twins: Mapping[str, str] = field(default_factory=dict)
+    variants: tuple[tuple[str, ...], ...] = ()
+    references: tuple[str, ...] = ()
+
+    @property
+    def qualified(self) -> tuple[EffectParameter, ...]:
+        """The parameters under their full names, ``id.name``."""
+        return tuple(replace(p, name=f'{self.id}.{p.name}') for p in self.parameters)

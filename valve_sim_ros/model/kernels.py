@@ -1,25 +1,38 @@
 # Copyright 2026 The valve_sim_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Three makes of the one step function: run over a record, single step, interpreted step.
+"""The makes of the step function: run over a record, single step, interpreted step.
 
 Machine code is kept between processes. numba looks only at the file of the function it stores,
 so the name under which it is stored carries a digest of all sources of the model.
 """
 
-from collections.abc import Callable
-from functools import lru_cache
+from collections.abc import Callable, Mapping
+from dis import get_instructions
+from functools import cache, lru_cache
 import hashlib
 from pathlib import Path
 from types import FunctionType
-from typing import Any
+from typing import Any, NamedTuple
 
 from numba import njit
 from numba.core.dispatcher import Dispatcher
 
 from . import pipeline
+from .composition import slot_function
 
 SLOTS = tuple(name for name in vars(pipeline) if name.endswith('_slot'))
 """Names of the places in the pipeline where an effect plugs in."""
+
+
+class Make(NamedTuple):
+    """The two compiled functions of one kind of valve, and the step as plain Python.
+
+    run : `pipeline.run`; step, interpreted : `pipeline.step`.
+    """
+
+    run: Any
+    step: Any
+    interpreted: Any
 
 
 @lru_cache(maxsize=1)
@@ -31,7 +44,7 @@ def source_digest() -> str:
     return digest.hexdigest()[:12]
 
 
-def remake(function: Any, make: Callable[..., Any], slots: dict[str, Any]) -> Any:
+def remake(function: Any, make: Callable[..., Any], slots: Mapping[str, Any]) -> Any:
     """Copy a jitted function and all it calls, with other slots, through `make`.
 
     Parameters
@@ -40,37 +53,45 @@ def remake(function: Any, make: Callable[..., Any], slots: dict[str, Any]) -> An
         What to copy.
     make : callable
         Turns each Python function into what shall be called: `njit`, or the identity.
-    slots : dict
-        Plain functions to put in the place of those of the same name.
+    slots : mapping
+        Jitted functions to put in the place of those of the same name.
     """
     source = function.py_func
+    options = {'forceinline': True} if function.targetoptions.get('forceinline') else {}
     space = dict(source.__globals__)
-    for name in source.__code__.co_names:
-        if name in slots:
-            space[name] = make(slots[name])
-        elif isinstance(space.get(name), Dispatcher):
-            space[name] = remake(space[name], make, slots)
-    return make(FunctionType(source.__code__, space, source.__name__, source.__defaults__))
+    for name in {i.argval for i in get_instructions(source) if i.opname == 'LOAD_GLOBAL'}:
+        called = slots.get(name, space.get(name))
+        if isinstance(called, Dispatcher):
+            space[name] = remake(called, make, slots)
+    copy = FunctionType(source.__code__, space, source.__name__, source.__defaults__)
+    return make(copy, **options)
 
 
-def kept(function: Any, slots: dict[str, Any] | None = None, label: str = 'base') -> Any:
+def kept(function: Any, slots: Mapping[str, Any], label: str) -> Any:
     """Return `function` compiled with these slots, its machine code kept between processes.
 
     `label` must differ between sets of slots: machine code is found again by it.
     """
-
-    def keep(python: Any) -> Any:
-        python.__qualname__ = f'{python.__name__}_{label}_{source_digest()}'
-        return njit(cache=True)(python)
-
-    outer = remake(function, njit, slots or {}).py_func
-    return keep(outer)
+    python = remake(function, njit, slots).py_func
+    python.__qualname__ = f'{python.__name__}_{label}_{source_digest()}'
+    return njit(cache=True)(python)
 
 
-def interpreted(function: Any, slots: dict[str, Any] | None = None) -> Any:
+def interpreted(function: Any, slots: Mapping[str, Any]) -> Any:
     """Return `function` as plain Python, for the time until machine code is there."""
-    return remake(function, lambda python: python, slots or {})
+    return remake(function, lambda python, **_: python, slots)
 
 
-run = kept(pipeline.run)
-advance = kept(pipeline.advance)
+@cache
+def make(effects: bool = False) -> Make:
+    """Return the makes of the base valve, or of that with the whole catalogue of effects.
+
+    Nothing is compiled before the first call of `run` or `step`.
+    """
+    slots = {name: slot_function(name) for name in SLOTS} if effects else {}
+    label = 'effects' if effects else 'base'
+    return Make(
+        kept(pipeline.run, slots, label),
+        kept(pipeline.step, slots, label),
+        interpreted(pipeline.step, slots),
+    )

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Valve parameters as a ROS parameter file, which `valve_plant --params-file` loads as it is."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 import os
 from pathlib import Path
 from typing import Any
@@ -11,7 +11,7 @@ import yaml
 
 from .errors import ModelError
 from .parameters import BRANCH, SAMPLE_TIME
-from .spec import ValveSpec
+from .spec import BASE_MODEL, EFFECTS, MODEL, ValveSpec
 
 NODE_ONLY = frozenset(
     {SAMPLE_TIME.name, 'initial_command', 'use_sim_time', 'start_type_description_service'}
@@ -47,7 +47,9 @@ def read_parameters(path: str | os.PathLike[str]) -> ValveSpec:
             'the file starts with "/**:" and "  ros__parameters:"'
         )
     try:
-        return ValveSpec().changed({k: v for k, v in found[0].items() if k not in NODE_ONLY})
+        return ValveSpec().changed(
+            {name: value for name, value in _flat(found[0]).items() if name not in NODE_ONLY}
+        )
     except ModelError as error:
         raise ModelError(f'{path}: {error}') from None
 
@@ -67,7 +69,15 @@ def write_parameters(
         Lines for the head of the file.
     """
     path = Path(path)
-    content = {'/**': {'ros__parameters': {**spec.values, BRANCH.name: spec.branch}}}
+    parameters: dict[str, Any] = {}
+    if spec.model != BASE_MODEL:
+        parameters[MODEL.name] = spec.model
+    if spec.effects:
+        parameters[EFFECTS] = list(spec.effects)
+    parameters |= spec.values
+    if spec.model == BASE_MODEL:
+        parameters[BRANCH.name] = spec.branch
+    content = {'/**': {'ros__parameters': parameters}}
     head = ''.join(f'# {line}\n' for comment in comments for line in comment.splitlines())
     aside = path.with_name(f'.{path.name}.part')
     aside.write_text(head + yaml.safe_dump(content, sort_keys=False), encoding='utf-8')
@@ -77,3 +87,14 @@ def write_parameters(
 def _is_node(node: Any) -> bool:
     """Tell whether a top-level entry carries parameters."""
     return isinstance(node, dict) and isinstance(node.get('ros__parameters'), dict)
+
+
+def _flat(parameters: Mapping[str, Any], prefix: str = '') -> dict[str, Any]:
+    """Return nested parameters (``air_leak: {leak_rate: 0.01}``) under their full names."""
+    flat: dict[str, Any] = {}
+    for name, value in parameters.items():
+        if isinstance(value, dict):
+            flat |= _flat(value, f'{prefix}{name}.')
+        else:
+            flat[f'{prefix}{name}'] = value
+    return flat

@@ -3,14 +3,16 @@
 """The way of a sample: command u, inlet pressure p1, chamber pressure p2, stem position x.
 
 `advance` is the one step function. The compiled run over a record, the compiled single step and
-the interpreted single step are three makes of it (see `compile.py`), so they cannot drift apart.
+the interpreted single step are three makes of it (see `kernels.py`), so they cannot drift apart.
+State and parameters are tuples of numbers: they live in registers, and nothing is counted or
+allocated per sample.
 
 The names `*_slot` are the places where an effect plugs in. Each is a function
-`slot(value, state, extras, memory, dt) -> value`; the base valve's slots return what they get.
+`slot(value, state, effects, memory, dt) -> value`; the base valve's slots return what they get.
 """
 
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 from numba import njit
 import numpy as np
@@ -22,22 +24,85 @@ from .stem import forced_gain, free_motion, Friction, Poles, Stem, stem_poles, s
 
 Array = npt.NDArray[np.float64]
 
-P1, P2, X, V, DIRECTION, ARMED = range(6)
-STATE_SIZE = 6
-"""Layout of the state: p1, p2, x [% of span], v [%/s], slip direction, arming."""
 
-F_D1, T_G1, T_G2, F_S, F_D, A_1, A_2, DELTA, PRINTED = range(9)
-THETA_SIZE = 9
-"""Layout of the parameters: `parameters.BASE` in order, then 1 for branch = printed."""
+class State(NamedTuple):
+    """The valve between two samples.
 
-DT, FILL_DECAY, EMPTY_DECAY, REGIME, POLE_1, POLE_2, PHI_1, PHI_2 = range(8)
-FILL_GAIN, FILL_RATE, EMPTY_GAIN, EMPTY_RATE = range(8, 12)
-TRANSITION_SIZE = 12
-"""Layout of what depends on the parameters and the step alone, kept between equal steps."""
+    p1, p2, x [% of span], v [%/s], slip direction, arming, output of the backlash [% of span]
+    (p1, unless an effect stands between them), time since the first sample [s].
+    """
+
+    p1: float
+    p2: float
+    x: float
+    v: float
+    direction: float
+    armed: float
+    play: float
+    time: float
 
 
-@njit
-def unchanged(value: Any, state: Array, extras: Array, memory: Array, dt: float) -> Any:
+class Theta(NamedTuple):
+    """The parameters: `parameters.BASE` in order, then 1 for branch = printed."""
+
+    f_d1: float
+    t_g1: float
+    t_g2: float
+    f_s: float
+    f_d: float
+    a_1: float
+    a_2: float
+    delta: float
+    printed: float
+
+
+class Lag(NamedTuple):
+    """The chamber over one step: rate [1/s], decay over it, and what the stem makes of it."""
+
+    rate: float
+    decay: float
+    gain: float
+    stem_rate: float
+
+
+class Motion(NamedTuple):
+    """The stem and the pressure p2 [% of span] after a step, and what drove them.
+
+    The opening force was target + excess exp(-rate tau) [% of span].
+    """
+
+    stem: Stem
+    p2: float
+    target: float
+    excess: float
+    rate: float
+    friction: Friction
+
+
+class Transition(NamedTuple):
+    """What depends on the parameters and the step alone, kept between equal steps.
+
+    A sample of `dt` seconds is taken in `substeps` equal steps of `step` seconds.
+    """
+
+    dt: float
+    substeps: int
+    step: float
+    filling: Lag
+    emptying: Lag
+    poles: Poles
+    phi1: float
+    phi2: float
+
+
+BASE_STEP = math.inf
+"""The base valve is exact over a step of any length."""
+STATE_SIZE = len(State._fields)
+THETA_SIZE = len(Theta._fields)
+
+
+@njit(forceinline=True)
+def unchanged(value: Any, state: Any, effects: Any, memory: Any, dt: float) -> Any:
     """Return `value`: the slot of a valve without effects."""
     return value
 
@@ -52,109 +117,163 @@ flow_slot = unchanged
 """(target [% of span], rate [1/s]) of p2: leak, volume, nonlinear flow, quick exhaust."""
 force_slot = unchanged
 """(opening force offset [% of span], Friction): spring, friction and fluid effects."""
+motion_slot = unchanged
+"""Motion after each step: stops, limits of speed, what the moved stem does to the chamber."""
 sensor_slot = unchanged
 """x as measured [% of span]: linkage, lag, calibration, quantisation, drift."""
 
 
 @njit
-def fill_transition(transition: Array, theta: Array, dt: float) -> None:
-    """Compute what a step of `dt` seconds needs from the parameters alone."""
-    transition[DT] = dt
-    transition[FILL_DECAY] = math.exp(-dt / theta[T_G1])
-    transition[EMPTY_DECAY] = math.exp(-dt / theta[T_G2])
-    poles = stem_poles(theta[A_1], theta[A_2])
-    transition[REGIME], transition[POLE_1], transition[POLE_2] = poles
-    transition[PHI_1], transition[PHI_2] = free_motion(dt, poles)
-    transition[FILL_GAIN], transition[FILL_RATE] = forced_gain(
-        1.0 / theta[T_G1], theta[A_1], theta[A_2], 1.0
-    )
-    transition[EMPTY_GAIN], transition[EMPTY_RATE] = forced_gain(
-        1.0 / theta[T_G2], theta[A_1], theta[A_2], 1.0
-    )
+def lag_over(rate: float, dt: float, a_1: float, a_2: float, stiffness: float) -> Lag:
+    """Return the chamber's lag over a step of `dt` seconds and the stem's answer to it."""
+    gain, stem_rate = forced_gain(rate, a_1, a_2, stiffness)
+    return Lag(rate, math.exp(-dt * rate), gain, stem_rate)
 
 
 @njit
+def transition_over(dt: float, theta: Theta, finest: float) -> Transition:
+    """Return what a sample of `dt` seconds needs, taken in steps of at most `finest` seconds."""
+    substeps = max(1, math.ceil(dt / finest))
+    step = dt / substeps
+    poles = stem_poles(theta.a_1, theta.a_2)
+    phi1, phi2 = free_motion(step, poles)
+    return Transition(
+        dt,
+        substeps,
+        step,
+        lag_over(1.0 / theta.t_g1, step, theta.a_1, theta.a_2, 1.0),
+        lag_over(1.0 / theta.t_g2, step, theta.a_1, theta.a_2, 1.0),
+        poles,
+        phi1,
+        phi2,
+    )
+
+
+@njit(forceinline=True)
 def advance(
     u: float,
-    dt: float,
-    state: Array,
-    theta: Array,
-    transition: Array,
-    extras: Array,
-    memory: Array,
-) -> float:
-    """Take the valve through one sample and return the measured stem position.
+    state: State,
+    theta: Theta,
+    transition: Transition,
+    effects: Any,
+    memory: Any,
+) -> tuple[State, float]:
+    """Take the valve through one sample.
 
     Parameters
     ----------
     u : float
         Command from now on [% of span].
-    dt : float
-        Time since the sample before [s]; 0 for the first sample.
-    state : ndarray, shape (STATE_SIZE,)
-        Updated in place.
-    theta : ndarray, shape (THETA_SIZE,)
+    state : State
+        After the sample before.
+    theta : Theta
         Parameters.
-    transition : ndarray, shape (TRANSITION_SIZE,)
-        Kept between calls; set `transition[DT]` to NaN after a change of parameters.
-    extras, memory : ndarray
-        Parameters and states of the effects in the slots; empty for the base valve.
+    transition : Transition
+        `transition_over` the time since the sample before [s]; that is 0 for the first sample.
+    effects, memory : tuple or ndarray
+        Parameters and states of the effects in the slots; empty tuples for the base valve.
 
     Returns
     -------
-    float
-        x as the sensor reports it [% of span]; `state` holds p1, p2 and the true x.
+    state : State
+        p1, p2 and the true stem after the sample.
+    x : float
+        Stem position as the sensor reports it [% of span].
     """
-    if transition[DT] != dt:
-        fill_transition(transition, theta, dt)
-    p1_held, p2 = state[P1], state[P2]
-    command = command_slot(u, state, extras, memory, dt)
-    p1 = inlet_slot(backlash(p1_held, command, theta[F_D1]), state, extras, memory, dt)
-    state[P1] = p1
-    inlet = tubing_slot(p1_held, state, extras, memory, dt)
-    if is_filling(inlet, p1, p2, theta[PRINTED] != 0.0):
-        nominal = 1.0 / theta[T_G1]
-        decay, gain, stem_rate = (
-            transition[FILL_DECAY],
-            transition[FILL_GAIN],
-            transition[FILL_RATE],
-        )
-    else:
-        nominal = 1.0 / theta[T_G2]
-        decay = transition[EMPTY_DECAY]
-        gain, stem_rate = transition[EMPTY_GAIN], transition[EMPTY_RATE]
-    target, rate = flow_slot((inlet, nominal), state, extras, memory, dt)
+    dt = transition.dt
+    command = command_slot(u, state, effects, memory, dt)
+    play = backlash(state.play, command, theta.f_d1)
+    p1 = inlet_slot(play, state, effects, memory, dt)
+    inlet = tubing_slot(state.p1, state, effects, memory, dt)
+    for _ in range(transition.substeps):
+        state = advance_pneumatics_and_stem(inlet, p1, state, theta, transition, effects, memory)
+    p2, x, v = state.p2, state.x, state.v
+    after = State(p1, p2, x, v, state.direction, state.armed, play, state.time)
+    return after, sensor_slot(x, after, effects, memory, dt)
+
+
+@njit(forceinline=True)
+def advance_pneumatics_and_stem(
+    inlet: float,
+    p1: float,
+    state: State,
+    theta: Theta,
+    transition: Transition,
+    effects: Any,
+    memory: Any,
+) -> State:
+    """Take p2 and the stem through one step under the held pressure `inlet` [% of span]."""
+    dt = transition.step
+    filling = is_filling(inlet, p1, state.p2, theta.printed != 0.0)
+    lag = transition.filling if filling else transition.emptying
+    target, rate = flow_slot((inlet, lag.rate), state, effects, memory, dt)
     offset, friction = force_slot(
-        (0.0, Friction(theta[F_S], theta[F_S], theta[F_D], theta[F_D], 1.0)),
+        (0.0, Friction(theta.f_s, theta.f_s, theta.f_d, theta.f_d, 1.0)),
         state,
-        extras,
+        effects,
         memory,
         dt,
     )
-    poles = Poles(int(transition[REGIME]), transition[POLE_1], transition[POLE_2])
-    phi1, phi2 = transition[PHI_1], transition[PHI_2]
-    if rate != nominal or friction.stiffness != 1.0:
-        decay = math.exp(-rate * dt)
-        poles = stem_poles(theta[A_1] * friction.stiffness, theta[A_2])
+    poles, phi1, phi2 = transition.poles, transition.phi1, transition.phi2
+    if rate != lag.rate or friction.stiffness != 1.0:
+        lag = lag_over(rate, dt, theta.a_1, theta.a_2, friction.stiffness)
+        poles = stem_poles(theta.a_1 * friction.stiffness, theta.a_2)
         phi1, phi2 = free_motion(dt, poles)
-        gain, stem_rate = forced_gain(rate, theta[A_1], theta[A_2], friction.stiffness)
+    excess = state.p2 - target
     stem = stem_step(
-        Stem(state[X], state[V], state[DIRECTION], state[ARMED] != 0.0),
+        Stem(state.x, state.v, state.direction, state.armed != 0.0),
         target + offset,
-        p2 - target,
+        excess,
         dt,
         friction,
-        theta[DELTA],
-        (gain, stem_rate),
+        theta.delta,
+        (lag.gain, lag.stem_rate),
         poles,
-        decay,
+        lag.decay,
         phi1,
         phi2,
     )
-    state[P2] = chamber_pressure(p2, target, decay)
-    state[X], state[V], state[DIRECTION] = stem.x, stem.v, stem.direction
-    state[ARMED] = 1.0 if stem.armed else 0.0
-    return sensor_slot(stem.x, state, extras, memory, dt)
+    p2 = chamber_pressure(state.p2, target, lag.decay)
+    motion = Motion(stem, p2, target + offset, excess, rate, friction)
+    motion = motion_slot(motion, state, effects, memory, dt)
+    stem, armed = motion.stem, 1.0 if motion.stem.armed else 0.0
+    return State(
+        state.p1,
+        motion.p2,
+        stem.x,
+        stem.v,
+        stem.direction,
+        armed,
+        state.play,
+        state.time + dt,
+    )
+
+
+@njit(forceinline=True)
+def state_from(values: Array) -> State:
+    """Return an array of STATE_SIZE numbers as a state."""
+    v = values
+    return State(v[0], v[1], v[2], v[3], v[4], v[5], v[6], v[7])
+
+
+@njit(forceinline=True)
+def theta_from(values: Array) -> Theta:
+    """Return an array of THETA_SIZE numbers as parameters."""
+    v = values
+    return Theta(v[0], v[1], v[2], v[3], v[4], v[5], v[6], v[7], v[8])
+
+
+@njit
+def step(
+    u: float, dt: float, state: Any, theta: Any, finest: float, effects: Any, memory: Any
+) -> float:
+    """Take the valve through one sample of `dt` seconds; arguments as for `run`, returns x."""
+    parameters = theta_from(theta)
+    transition = transition_over(dt, parameters, finest)
+    now, x = advance(u, state_from(state), parameters, transition, effects, memory)
+    for index, value in enumerate(now):
+        state[index] = value
+    return x
 
 
 @njit
@@ -163,8 +282,9 @@ def run(
     dt: Array,
     state: Array,
     theta: Array,
-    extras: Array,
-    memory: Array,
+    finest: float,
+    effects: Any,
+    memory: Any,
     outputs: Array,
 ) -> None:
     """Take the valve through a record.
@@ -175,17 +295,30 @@ def run(
         Commands [% of span].
     dt : ndarray, shape (n,) or (1,)
         Time since the sample before [s]. Of length 1: that step after a first one of 0 s.
-    state, theta, extras, memory : ndarray
+    state : ndarray, shape (STATE_SIZE,)
+        Updated in place.
+    theta : ndarray, shape (THETA_SIZE,)
+        Parameters.
+    finest : float
+        Longest step inside a sample [s]; infinite where the closed forms are exact.
+    effects, memory : tuple or ndarray
         As for `advance`.
     outputs : ndarray, shape (3, n)
         Receives p1, p2, x [% of span].
     """
-    transition = np.full(TRANSITION_SIZE, np.nan)
+    parameters = theta_from(theta)
+    now = state_from(state)
+    transition = transition_over(0.0, parameters, finest)
     uniform = dt.size == 1
     for k in range(u.size):
-        step = dt[0] if uniform else dt[k]
+        duration = dt[0] if uniform else dt[k]
         if uniform and k == 0:
-            step = 0.0
-        outputs[2, k] = advance(u[k], step, state, theta, transition, extras, memory)
-        outputs[0, k] = state[P1]
-        outputs[1, k] = state[P2]
+            duration = 0.0
+        if duration != transition.dt:
+            transition = transition_over(duration, parameters, finest)
+        now, x = advance(u[k], now, parameters, transition, effects, memory)
+        outputs[0, k] = now.p1
+        outputs[1, k] = now.p2
+        outputs[2, k] = x
+    for index, value in enumerate(now):
+        state[index] = value

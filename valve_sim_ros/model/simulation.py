@@ -5,18 +5,20 @@
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 import threading
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from . import kernels, pipeline
+from . import pipeline
 from .errors import ModelError
+from .kernels import Make, make
 from .parameters import SAMPLE_TIME
 from .pipeline import Array
-from .spec import ValveSpec
+from .rivals import RIVALS
+from .spec import BASE_MODEL, ValveSpec
 
-NOTHING = np.empty(0)
+NO_EFFECTS: tuple[()] = ()
 
 
 @dataclass(frozen=True)
@@ -30,13 +32,39 @@ class InitialState:
     p2: float = 0.0
     x: float = 0.0
 
-    def array(self) -> Array:
-        """Return the state as the compiled code receives it."""
-        state = np.zeros(pipeline.STATE_SIZE)
-        state[: pipeline.V] = self.p1, self.p2, self.x
-        if not np.isfinite(state).all():
+    def array(self, spec: ValveSpec) -> Array:
+        """Return the state of a valve as the compiled code receives it."""
+        if not np.isfinite([self.p1, self.p2, self.x]).all():
             raise ModelError(f'initial state {self}: expected finite numbers in % of span')
-        return state
+        if spec.model != BASE_MODEL:
+            return np.asarray(RIVALS[spec.model].start(self.p1, self.p2, self.x, spec.theta))
+        return np.array(
+            pipeline.State(self.p1, self.p2, self.x, 0.0, 0.0, 0.0, play=self.p1, time=0.0)
+        )
+
+
+class Drive(NamedTuple):
+    """What a valve's functions receive beside the command and the state."""
+
+    theta: Any
+    finest: float
+    effects: Any
+    memory: Any
+
+
+def machine(spec: ValveSpec) -> Make:
+    """Return the compiled functions for the valve's model."""
+    if spec.model != BASE_MODEL:
+        return RIVALS[spec.model].make()
+    return make(effects=bool(spec.active))
+
+
+def drive(spec: ValveSpec) -> Drive:
+    """Return what the functions of `machine(spec)` need, with the effects' memory empty."""
+    if not spec.active:
+        return Drive(spec.theta, pipeline.BASE_STEP, NO_EFFECTS, NO_EFFECTS)
+    effects, memory_size, finest = spec.composition
+    return Drive(spec.theta, finest, effects, np.zeros(memory_size))
 
 
 @dataclass(frozen=True)
@@ -78,8 +106,8 @@ def simulate(
     sample_time : float
         Sampling period [s], used unless `time` is given.
     parameters : mapping or ValveSpec, optional
-        Values by name (``{'f_s': 4.0, 'branch': 'printed'}``); the rest keeps the paper's
-        values, eq. (12).
+        Values by name (``{'f_s': 4.0, 'effects': ['air_leak'], 'air_leak.leak_rate': 0.01}``,
+        ``{'model': 'kano'}``); the rest keeps its defaults, the paper's values of eq. (12).
     time : array_like, shape (n,), optional
         Strictly increasing times of the samples [s], for records without a fixed period.
     initial : InitialState, optional
@@ -117,8 +145,8 @@ def simulate(
                 'strictly increasing'
             )
     outputs = np.empty((3, command.size))
-    state = (initial or InitialState()).array()
-    kernels.run(command, dt, state, spec.theta, NOTHING, NOTHING, outputs)
+    state = (initial or InitialState()).array(spec)
+    machine(spec).run(command, dt, state, *drive(spec), outputs)
     p1, p2, x = outputs
     return Simulation(t, command, p1, p2, x, spec)
 
@@ -165,32 +193,34 @@ class Valve:
         background : bool
             Compile in a thread; if False, compile before returning.
         """
-        self._step: Callable[..., float] = kernels.interpreted(pipeline.advance)
+        self._initial = initial or InitialState()
+        self._background = background
+        self._make: Make | None = None
         self._compiled: Callable[..., float] | None = None
-        self._transition: Any = [float('nan')] * pipeline.TRANSITION_SIZE
-        self.reset(initial)
         self.spec = spec or ValveSpec()
-        if background:
-            threading.Thread(target=self._compile, name='compile', daemon=True).start()
-        else:
-            self._compile()
+        self.reset()
 
     @property
     def spec(self) -> ValveSpec:
-        """Parameters in force; assigning takes effect with the next sample."""
+        """Parameters in force; assigning takes effect with the next sample.
+
+        Another model, or effects where there were none, start the valve anew from where it is.
+        """
         return self._spec
 
     @spec.setter
     def spec(self, spec: ValveSpec) -> None:
-        self._spec = spec
-        self._theta: Any = self._like_state(spec.theta)
-        self._transition[pipeline.DT] = float('nan')
+        before = getattr(self, '_drive', None)
+        self._spec, self._drive = spec, drive(spec)
+        make = machine(spec)
+        if make is not self._make:
+            self._prepare(make)
+        elif before is not None:
+            self._drive = self._drive._replace(memory=before.memory)
 
     def reset(self, initial: InitialState | None = None) -> None:
-        """Put the valve at rest in `initial`; the next sample is its first."""
-        state = (initial or InitialState()).array()
-        self._state: Any = state if self._compiled else state.tolist()
-        self._first = True
+        """Put the valve at rest in `initial` (its start by default) before a first sample."""
+        self._begin(initial or self._initial)
 
     def step(self, u: float, dt: float) -> tuple[float, float, float]:
         """Take one sample: command [% of span], time since the sample before [s].
@@ -202,41 +232,39 @@ class Valve:
         p1, p2, x : float
             After the sample [% of span].
         """
-        if self._compiled and isinstance(self._state, list):
-            self._adopt_machine_code()
-        x = self._step(
-            float(u),
-            0.0 if self._first else float(dt),
-            self._state,
-            self._theta,
-            self._transition,
-            NOTHING,
-            NOTHING,
-        )
+        if self._compiled is not None:
+            self._step, self._compiled = self._compiled, None
+            self._state = np.array(self._state)
+        x = self._step(float(u), 0.0 if self._first else float(dt), self._state, *self._drive)
         self._first = False
-        return float(self._state[pipeline.P1]), float(self._state[pipeline.P2]), float(x)
+        self._position = float(x)
+        return float(self._state[0]), float(self._state[1]), self._position
 
-    def _compile(self) -> None:
+    def _prepare(self, make: Make) -> None:
+        """Start with the interpreted step and have the machine code made or fetched."""
+        first = self._make is None
+        self._make, self._step = make, make.interpreted
+        if not first:
+            self._begin(InitialState(*map(float, self._state[:2]), self._position))
+        if self._background:
+            threading.Thread(
+                target=self._compile, args=(make, self._spec), name='compile', daemon=True
+            ).start()
+        else:
+            self._compile(make, self._spec)
+
+    def _begin(self, initial: InitialState) -> None:
+        """Stand at rest, nothing remembered."""
+        state = initial.array(self._spec)
+        self._drive = drive(self._spec)
+        # plain numbers are what the interpreted step is fastest with
+        interpreting = self._make is not None and self._step is self._make.interpreted
+        self._state: Any = state.tolist() if interpreting else state
+        self._position = initial.x
+        self._first = True
+
+    def _compile(self, make: Make, spec: ValveSpec) -> None:
         """Make or fetch the machine code with a step that counts for nothing."""
-        kernels.advance(
-            0.0,
-            0.0,
-            InitialState().array(),
-            ValveSpec().theta,
-            np.full(pipeline.TRANSITION_SIZE, np.nan),
-            NOTHING,
-            NOTHING,
-        )
-        self._compiled = kernels.advance
-
-    def _like_state(self, values: Array) -> Any:
-        """Return numbers in the container the current make of the step is fastest with."""
-        return values.tolist() if isinstance(self._state, list) else values
-
-    def _adopt_machine_code(self) -> None:
-        """Hand state and parameters over to the compiled step."""
-        assert self._compiled is not None
-        self._step = self._compiled
-        self._state = np.array(self._state)
-        self._transition = np.array(self._transition)
-        self._theta = np.array(self._theta)
+        make.step(0.0, 0.0, InitialState().array(spec), *drive(spec))
+        if make is self._make:
+            self._compiled = make.step

@@ -18,11 +18,16 @@ MAX_EVENTS = 200
 
 
 class Poles(NamedTuple):
-    """Free motion of the stem: two real poles, or a decay rate and an angular frequency [1/s]."""
+    """Free motion of the stem: two real poles, or a decay rate and an angular frequency [1/s].
+
+    `scale` [s] is one over what the closed form of a slip divides by: their difference, or the
+    frequency.
+    """
 
     regime: int
     first: float
     second: float
+    scale: float
 
 
 class Stem(NamedTuple):
@@ -65,11 +70,13 @@ def stem_poles(a_1: float, a_2: float) -> Poles:
     half = 0.5 * a_2
     discriminant = half * half - a_1
     if abs(discriminant) <= 1e-12 * half * half:
-        return Poles(CRITICAL, -half, -half)
+        return Poles(CRITICAL, -half, -half, 1.0)
     if discriminant > 0.0:
         root = math.sqrt(discriminant)
-        return Poles(OVERDAMPED, -a_1 / (half + root), -half - root)
-    return Poles(UNDERDAMPED, -half, math.sqrt(-discriminant))
+        first, second = -a_1 / (half + root), -half - root
+        return Poles(OVERDAMPED, first, second, 1.0 / (first - second))
+    omega = math.sqrt(-discriminant)
+    return Poles(UNDERDAMPED, -half, omega, 1.0 / omega)
 
 
 @njit
@@ -93,7 +100,7 @@ def forced_gain(rate: float, a_1: float, a_2: float, stiffness: float) -> tuple[
     return a_1 / denominator, rate
 
 
-@njit
+@njit(forceinline=True)
 def begin_slip(
     stem: Stem,
     target: float,
@@ -111,38 +118,45 @@ def begin_slip(
     w0 = stem.v + force * rate
     if poles.regime == OVERDAMPED:
         r1, r2 = poles.first, poles.second
-        c1 = (w0 - r2 * y0) / (r1 - r2)
-        c2 = (r1 * y0 - w0) / (r1 - r2)
+        c1 = (w0 - r2 * y0) * poles.scale
+        c2 = (r1 * y0 - w0) * poles.scale
         return Slip(base, force, rate, c1, c2, r1 * c1, r2 * c2)
     half = -poles.first
     if poles.regime == CRITICAL:
         c2 = w0 + half * y0
         return Slip(base, force, rate, y0, c2, w0, -half * c2)
-    omega = poles.second
-    c2 = (w0 + half * y0) / omega
-    return Slip(base, force, rate, y0, c2, w0, -half * c2 - omega * y0)
+    c2 = (w0 + half * y0) * poles.scale
+    return Slip(base, force, rate, y0, c2, w0, -half * c2 - poles.second * y0)
 
 
-@njit
+@njit(forceinline=True)
 def slip_position(slip: Slip, decay: float, phi1: float, phi2: float) -> float:
     """Return x where exp(-rate tau) = `decay` and the basis functions are phi1, phi2."""
     return slip.base + slip.forced * decay + slip.c1 * phi1 + slip.c2 * phi2
 
 
-@njit
+@njit(forceinline=True)
 def slip_speed(slip: Slip, decay: float, phi1: float, phi2: float) -> float:
     """Return the stem's speed where `slip_position` returns its position."""
     return slip.d1 * phi1 + slip.d2 * phi2 - slip.rate * slip.forced * decay
 
 
 @njit
-def speed_at(tau: float, slip: Slip, poles: Poles) -> float:
-    """Return the stem's speed [%/s] at `tau` seconds into the slip."""
+def speed_and_acceleration(tau: float, slip: Slip, poles: Poles) -> tuple[float, float]:
+    """Return the stem's speed [%/s] and acceleration [%/s^2] at `tau` seconds into the slip."""
     phi1, phi2 = free_motion(tau, poles)
-    return slip_speed(slip, math.exp(-slip.rate * tau), phi1, phi2)
+    push = slip.rate * slip.forced * math.exp(-slip.rate * tau)
+    one, two = slip.d1 * phi1, slip.d2 * phi2
+    if poles.regime == OVERDAMPED:
+        bend = poles.first * one + poles.second * two
+    elif poles.regime == CRITICAL:
+        bend = poles.first * (one + two) + slip.d2 * phi1
+    else:
+        bend = poles.first * (one + two) + poles.second * (slip.d2 * phi1 - slip.d1 * phi2)
+    return one + two - push, bend + slip.rate * push
 
 
-@njit
+@njit(forceinline=True)
 def surely_moving(
     slip: Slip,
     direction: float,
@@ -170,7 +184,7 @@ def first_stop(
 
     The speed is a sum of at most four exponentials, each of which acts about its own time
     constant, or a decaying oscillation: a scan with steps that grow with the time since the start,
-    or of an eighth of a period, brackets the first zero and bisection finds it.
+    or of an eighth of a period, brackets the first zero.
     """
     growth = 1.5
     if poles.regime == UNDERDAMPED:
@@ -180,16 +194,10 @@ def first_stop(
     start = 0.0
     while start < left:
         end = min(start + step, left)
-        speed = direction * speed_at(end, slip, poles)
+        speed = direction * speed_and_acceleration(end, slip, poles)[0]
         level = delta if armed else 0.0
         if speed < level or (armed and speed == level):
-            for _ in range(60):
-                middle = 0.5 * (start + end)
-                if direction * speed_at(middle, slip, poles) > level:
-                    start = middle
-                else:
-                    end = middle
-            return end, armed
+            return stop_between(start, end, slip, direction, level, poles), armed
         armed = armed or speed > delta
         start = end
         step *= growth
@@ -197,6 +205,83 @@ def first_stop(
 
 
 @njit
+def stop_between(
+    start: float, end: float, slip: Slip, direction: float, level: float, poles: Poles
+) -> float:
+    """Return when the speed falls to `level` between two times: Newton, kept in its bracket."""
+    tolerance = 1e-15 * end
+    tau = 0.5 * (start + end)
+    for _ in range(60):
+        speed, acceleration = speed_and_acceleration(tau, slip, poles)
+        above = direction * speed - level
+        if above > 0.0:
+            start = tau
+        else:
+            end = tau
+        slope = direction * acceleration
+        guess = tau - above / slope if slope < 0.0 else start
+        if not start < guess < end:
+            guess = 0.5 * (start + end)
+        if abs(guess - tau) <= tolerance:
+            break
+        tau = guess
+    return tau
+
+
+@njit
+def through_events(
+    stem: Stem,
+    target: float,
+    excess: float,
+    duration: float,
+    friction: Friction,
+    delta: float,
+    forced: tuple[float, float],
+    poles: Poles,
+) -> Stem:
+    """Advance the stem event by event; `stem_step` says what the arguments are."""
+    rate = forced[1]
+    left = duration
+    for _ in range(MAX_EVENTS):
+        if stem.direction == 0.0:
+            spring = friction.stiffness * stem.x
+            up, down = spring + friction.static_up, spring - friction.static_down
+            pressure = target + excess
+            if pressure <= up and pressure >= down:
+                final = target + excess * math.exp(-rate * left)
+                if final <= up and final >= down:
+                    return stem
+                level = up if final > up else down
+                wait = -math.log((level - target) / excess) / rate
+                if wait >= left:
+                    return stem
+                left -= max(wait, 0.0)
+                excess = level - target
+                pressure = final
+            stem = Stem(stem.x, 0.0, 1.0 if pressure > up else -1.0, False)
+        slip = begin_slip(stem, target, excess, friction, forced, poles)
+        stop, armed = first_stop(slip, stem.direction, stem.armed, delta, left, poles)
+        if stop >= 0.0:
+            fall = math.exp(-slip.rate * stop)
+            one, two = free_motion(stop, poles)
+            stem = Stem(slip_position(slip, fall, one, two), 0.0, 0.0, False)
+            excess *= math.exp(-rate * stop)
+            left -= stop
+            if left <= 0.0:
+                return stem
+            continue
+        fall = math.exp(-slip.rate * left)
+        one, two = free_motion(left, poles)
+        return Stem(
+            slip_position(slip, fall, one, two),
+            slip_speed(slip, fall, one, two),
+            stem.direction,
+            armed,
+        )
+    return stem
+
+
+@njit(forceinline=True)
 def stem_step(
     stem: Stem,
     target: float,
@@ -227,58 +312,26 @@ def stem_step(
     forced, poles : tuple
         What `forced_gain` and `stem_poles` return.
     decay, phi1, phi2 : float
-        exp(-rate duration) and `free_motion(duration, poles)`, so that the common case of an
-        interval without an event costs no exponential.
+        exp(-rate duration) and `free_motion(duration, poles)`, so that an interval without an
+        event, the usual case, costs no exponential.
 
     Returns
     -------
     Stem
     """
-    rate = forced[1]
-    left = duration
-    for _ in range(MAX_EVENTS):
-        if stem.direction == 0.0:
-            spring = friction.stiffness * stem.x
-            up, down = spring + friction.static_up, spring - friction.static_down
-            pressure = target + excess
-            if pressure <= up and pressure >= down:
-                final = target + excess * (decay if left == duration else math.exp(-rate * left))
-                if final <= up and final >= down:
-                    return stem
-                level = up if final > up else down
-                wait = -math.log((level - target) / excess) / rate
-                if wait >= left:
-                    return stem
-                left -= max(wait, 0.0)
-                excess = level - target
-                pressure = final
-            stem = Stem(stem.x, 0.0, 1.0 if pressure > up else -1.0, False)
+    if stem.direction == 0.0:
+        spring = friction.stiffness * stem.x
+        up, down = spring + friction.static_up, spring - friction.static_down
+        pressure, final = target + excess, target + excess * decay
+        if max(pressure, final) <= up and min(pressure, final) >= down:
+            return stem
+    elif stem.armed:
         slip = begin_slip(stem, target, excess, friction, forced, poles)
-        whole = left == duration
-        if not (
-            whole
-            and stem.armed
-            and surely_moving(slip, stem.direction, delta, decay, phi1, phi2, poles)
-        ):
-            stop, armed = first_stop(slip, stem.direction, stem.armed, delta, left, poles)
-            if stop >= 0.0:
-                fall = math.exp(-slip.rate * stop)
-                one, two = free_motion(stop, poles)
-                stem = Stem(slip_position(slip, fall, one, two), 0.0, 0.0, False)
-                excess *= math.exp(-rate * stop)
-                left -= stop
-                if left <= 0.0:
-                    return stem
-                continue
-            stem = Stem(stem.x, stem.v, stem.direction, armed)
-        fall, one, two = decay, phi1, phi2
-        if not whole:
-            fall = math.exp(-slip.rate * left)
-            one, two = free_motion(left, poles)
-        return Stem(
-            slip_position(slip, fall, one, two),
-            slip_speed(slip, fall, one, two),
-            stem.direction,
-            stem.armed,
-        )
-    return stem
+        if surely_moving(slip, stem.direction, delta, decay, phi1, phi2, poles):
+            return Stem(
+                slip_position(slip, decay, phi1, phi2),
+                slip_speed(slip, decay, phi1, phi2),
+                stem.direction,
+                True,
+            )
+    return through_events(stem, target, excess, duration, friction, delta, forced, poles)

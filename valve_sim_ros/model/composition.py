@@ -1,0 +1,81 @@
+# Copyright 2026 The valve_sim_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The slots of the pipeline filled with the whole catalogue of effects.
+
+All effects are compiled into one set of slots; which of them act is told by a flag each, so that
+any combination runs without compiling again.
+"""
+
+from collections.abc import Iterable, Mapping
+from typing import Any, NamedTuple
+
+from numba import njit
+import numpy as np
+
+from .declarations import Effect
+from .effects import CATALOGUE
+from .pipeline import Array, BASE_STEP
+
+
+class Place(NamedTuple):
+    """Where the flag and parameters, and the memory, of one effect begin."""
+
+    flag: int
+    memory: int
+
+
+def _places() -> tuple[dict[str, Place], int, int]:
+    """Lay all effects out one after the other."""
+    places, flag, memory = {}, 0, 0
+    for effect in CATALOGUE.values():
+        places[effect.id] = Place(flag, memory)
+        flag += 1 + len(effect.parameters)
+        memory += effect.memory
+    return places, flag, memory
+
+
+PLACES, EFFECTS_SIZE, MEMORY_SIZE = _places()
+
+
+class Composition(NamedTuple):
+    """What the compiled pipeline needs to know of the effects of one valve."""
+
+    effects: Array
+    memory_size: int
+    finest: float
+
+
+def compose(active: Iterable[str], values: Mapping[str, float]) -> Composition:
+    """Return the effects in force with their parameters by full name."""
+    effects, finest = np.zeros(EFFECTS_SIZE), BASE_STEP
+    for name in active:
+        effect, flag = CATALOGUE[name], PLACES[name].flag
+        effects[flag] = 1.0
+        for offset, parameter in enumerate(effect.parameters, 1):
+            effects[flag + offset] = values[f'{name}.{parameter.name}']
+        finest = min(finest, effect.longest_step)
+    return Composition(effects, MEMORY_SIZE, finest)
+
+
+def slot_function(slot: str) -> Any:
+    """Return one slot with all effects that fill it, in the order of the signal path."""
+    filling = sorted(
+        (effect for effect in CATALOGUE.values() if slot in effect.slots),
+        key=lambda effect: (effect.order, effect.id),
+    )
+    lines = [f'def {slot}(value, state, effects, memory, dt):']
+    space: dict[str, Any] = {}
+    for effect in filling:
+        space[effect.id] = effect.slots[slot]
+        lines.append(f'    if effects[{PLACES[effect.id].flag}] != 0.0:')
+        lines.append(f'        value = {effect.id}({_arguments(effect)})')
+    exec('\n'.join([*lines, '    return value']), space)
+    return njit(space[slot])
+
+
+def _arguments(effect: Effect) -> str:
+    """Return the call of one effect: its parameters as a tuple, its part of the memory."""
+    flag, memory = PLACES[effect.id]
+    own = ''.join(f'effects[{flag + 1 + index}], ' for index in range(len(effect.parameters)))
+    part = f'memory[{memory}:{memory + effect.memory}]' if effect.memory else '()'
+    return f'value, state, ({own}), {part}, dt'
