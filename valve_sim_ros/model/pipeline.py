@@ -9,6 +9,7 @@ allocated per sample.
 
 The names `*_slot` are the places where an effect plugs in. Each is a function
 `slot(value, state, effects, memory, dt) -> value`; the base valve's slots return what they get.
+Their dt is that of the step, and `state` is that at its start, but for the sensor at its end.
 """
 
 import math
@@ -29,7 +30,8 @@ class State(NamedTuple):
     """The valve between two samples.
 
     p1, p2, x [% of span], v [%/s], slip direction, arming, output of the backlash [% of span]
-    (p1, unless an effect stands between them), time since the first sample [s].
+    (p1, unless an effect stands between them), command in force [% of span], time since the
+    first sample [s].
     """
 
     p1: float
@@ -39,6 +41,7 @@ class State(NamedTuple):
     direction: float
     armed: float
     play: float
+    command: float
     time: float
 
 
@@ -158,52 +161,33 @@ def advance(
     effects: Any,
     memory: Any,
 ) -> tuple[State, float]:
-    """Take the valve through one sample.
+    """Take the valve through one step, at whose end the command becomes `u`.
 
     Parameters
     ----------
     u : float
-        Command from now on [% of span].
+        Command from the end of the step on [% of span].
     state : State
-        After the sample before.
+        At the start of the step.
     theta : Theta
         Parameters.
     transition : Transition
-        `transition_over` the time since the sample before [s]; that is 0 for the first sample.
+        `transition_over` the sample; the step is `transition.step` seconds long.
     effects, memory : tuple or ndarray
         Parameters and states of the effects in the slots; empty tuples for the base valve.
 
     Returns
     -------
     state : State
-        p1, p2 and the true stem after the sample.
+        p1, p2 and the true stem at the end of the step.
     x : float
         Stem position as the sensor reports it [% of span].
     """
-    dt = transition.dt
+    dt = transition.step
     command = command_slot(u, state, effects, memory, dt)
     play = backlash(state.play, command, theta.f_d1)
     p1 = inlet_slot(play, state, effects, memory, dt)
     inlet = tubing_slot(state.p1, state, effects, memory, dt)
-    for _ in range(transition.substeps):
-        state = advance_pneumatics_and_stem(inlet, p1, state, theta, transition, effects, memory)
-    p2, x, v = state.p2, state.x, state.v
-    after = State(p1, p2, x, v, state.direction, state.armed, play, state.time)
-    return after, sensor_slot(x, after, effects, memory, dt)
-
-
-@njit(forceinline=True)
-def advance_pneumatics_and_stem(
-    inlet: float,
-    p1: float,
-    state: State,
-    theta: Theta,
-    transition: Transition,
-    effects: Any,
-    memory: Any,
-) -> State:
-    """Take p2 and the stem through one step under the held pressure `inlet` [% of span]."""
-    dt = transition.step
     filling = is_filling(inlet, p1, state.p2, theta.printed != 0.0)
     lag = transition.filling if filling else transition.emptying
     target, rate = flow_slot((inlet, lag.rate), state, effects, memory, dt)
@@ -235,25 +219,33 @@ def advance_pneumatics_and_stem(
     )
     p2 = chamber_pressure(state.p2, target, lag.decay)
     motion = Motion(stem, p2, target + offset, excess, rate, friction)
-    motion = motion_slot(motion, state, effects, memory, dt)
-    stem, armed = motion.stem, 1.0 if motion.stem.armed else 0.0
-    return State(
-        state.p1,
-        motion.p2,
-        stem.x,
-        stem.v,
-        stem.direction,
-        armed,
-        state.play,
-        state.time + dt,
-    )
+    stem, p2 = motion_slot(motion, state, effects, memory, dt)[:2]
+    armed = 1.0 if stem.armed else 0.0
+    time = state.time + dt
+    after = State(p1, p2, stem.x, stem.v, stem.direction, armed, play, u, time)
+    return after, sensor_slot(stem.x, after, effects, memory, dt)
+
+
+@njit(forceinline=True)
+def advance_sample(
+    u: float,
+    state: State,
+    theta: Theta,
+    transition: Transition,
+    effects: Any,
+    memory: Any,
+) -> tuple[State, float]:
+    """Take the valve through one sample of `transition.dt` seconds; see `advance`."""
+    for _ in range(transition.substeps - 1):
+        state = advance(state.command, state, theta, transition, effects, memory)[0]
+    return advance(u, state, theta, transition, effects, memory)
 
 
 @njit(forceinline=True)
 def state_from(values: Array) -> State:
     """Return an array of STATE_SIZE numbers as a state."""
     v = values
-    return State(v[0], v[1], v[2], v[3], v[4], v[5], v[6], v[7])
+    return State(v[0], v[1], v[2], v[3], v[4], v[5], v[6], v[7], v[8])
 
 
 @njit(forceinline=True)
@@ -270,7 +262,7 @@ def step(
     """Take the valve through one sample of `dt` seconds; arguments as for `run`, returns x."""
     parameters = theta_from(theta)
     transition = transition_over(dt, parameters, finest)
-    now, x = advance(u, state_from(state), parameters, transition, effects, memory)
+    now, x = advance_sample(u, state_from(state), parameters, transition, effects, memory)
     for index, value in enumerate(now):
         state[index] = value
     return x
@@ -316,7 +308,7 @@ def run(
             duration = 0.0
         if duration != transition.dt:
             transition = transition_over(duration, parameters, finest)
-        now, x = advance(u[k], now, parameters, transition, effects, memory)
+        now, x = advance_sample(u[k], now, parameters, transition, effects, memory)
         outputs[0, k] = now.p1
         outputs[1, k] = now.p2
         outputs[2, k] = x

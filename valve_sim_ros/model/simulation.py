@@ -39,7 +39,9 @@ class InitialState:
         if spec.model != BASE_MODEL:
             return np.asarray(RIVALS[spec.model].start(self.p1, self.p2, self.x, spec.theta))
         return np.array(
-            pipeline.State(self.p1, self.p2, self.x, 0.0, 0.0, 0.0, play=self.p1, time=0.0)
+            pipeline.State(
+                self.p1, self.p2, self.x, 0.0, 0.0, 0.0, play=self.p1, command=self.p1, time=0.0
+            )
         )
 
 

@@ -1,0 +1,43 @@
+# Copyright 2026 The valve_sim_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""First-order lag of the electro-pneumatic converter."""
+
+from typing import Any
+
+from numba import njit
+
+from ..declarations import Effect, EffectParameter
+from ..memory import lagged
+
+
+@njit
+def inlet(value: float, state: Any, p: Any, memory: Any, dt: float) -> float:
+    """Return p1 on its way to what the converter asked for since the last step."""
+    if state.time + dt == 0.0:
+        memory[0], memory[1] = state.p1, value
+    memory[0] = lagged(memory[0], memory[1], p[0], dt)
+    memory[1] = value
+    return memory[0]
+
+
+EFFECT = Effect(
+    id='ip_lag',
+    title='Lag of the electro-pneumatic converter',
+    stage='u-p1',
+    parameters=(
+        EffectParameter(
+            'time_constant', 'tau', 's', 1.0, 0.0, 20.0, 'linear', 'Time constant of p1 after u'
+        ),
+    ),
+    slots={'inlet_slot': inlet},
+    memory=2,
+    longest_step=0.1,
+    order=30,
+    explanation='The converter fills its outlet through a restriction, so p1 follows u gradually.',
+    symptom='p1 rounds after each step of u.',
+    confirm='Record p1 beside u during a few steps.',
+    twins={
+        'ip_dead_time': 'a dead time shifts the step of p1 without rounding it: record p1',
+        'linkage_backlash': 'with x alone both delay small reversals: record p1',
+    },
+)

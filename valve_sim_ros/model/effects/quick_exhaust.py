@@ -1,0 +1,65 @@
+# Copyright 2026 The valve_sim_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Quick-exhaust valve, or volume booster, at the actuator."""
+
+import math
+from typing import Any
+
+from numba import njit
+
+from ..declarations import Effect, EffectParameter
+
+
+@njit
+def flow(value: Any, state: Any, p: Any, memory: Any, dt: float) -> tuple[float, float]:
+    """Return the mean rate of a step that may pass the threshold."""
+    target, rate = value
+    factor, threshold = p
+    excess = state.p2 - target
+    if dt <= 0.0 or excess <= threshold:
+        return target, rate
+    fast = factor * rate
+    until = math.log(excess / threshold) / fast if threshold > 0.0 else dt
+    if until >= dt:
+        return target, fast
+    return target, (fast * until + rate * (dt - until)) / dt
+
+
+EFFECT = Effect(
+    id='quick_exhaust',
+    title='Quick exhaust',
+    stage='p1-p2',
+    parameters=(
+        EffectParameter(
+            'factor',
+            'k',
+            '-',
+            3.0,
+            0.1,
+            50.0,
+            'log',
+            'How much faster p2 falls above the threshold',
+            neutral=1.0,
+        ),
+        EffectParameter(
+            'threshold',
+            'D',
+            '%',
+            8.0,
+            0.1,
+            60.0,
+            'log',
+            'p2 - p1 above which the exhaust opens',
+            neutral=8.0,
+        ),
+    ),
+    slots={'flow_slot': flow},
+    longest_step=0.1,
+    order=20,
+    explanation='A valve at the actuator opens to the atmosphere once p2 exceeds p1 enough.',
+    symptom='p2 falls fast while it is far above p1, and slowly after that; never when it rises.',
+    confirm='Compare a large and a small step down.',
+    twins={
+        'nonlinear_flow': 'that one acts in both directions and at all sizes of step',
+    },
+)

@@ -1,0 +1,92 @@
+# Copyright 2026 The valve_sim_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Limited rate of the chamber pressure, or of the stem by direction."""
+
+import math
+from typing import Any
+
+from numba import njit
+
+from ..declarations import Effect, EffectParameter
+from ..pipeline import Motion
+from ..stem import Stem
+
+UNLIMITED = 1000.0
+
+
+@njit
+def flow(value: Any, state: Any, p: Any, memory: Any, dt: float) -> tuple[float, float]:
+    """Return the rate that leads to the exact end of |p2'| <= r."""
+    target, rate = value
+    limit = p[0]
+    excess = abs(state.p2 - target)
+    if dt <= 0.0 or rate * excess <= limit:
+        return target, rate
+    ramp = min((excess - limit / rate) / limit, dt)
+    end = (excess - limit * ramp) * math.exp(-rate * (dt - ramp))
+    return target, math.log(excess / end) / dt
+
+
+@njit
+def motion(value: Any, state: Any, p: Any, memory: Any, dt: float) -> Motion:
+    """Let the stem move no further than its limits allow."""
+    opening, closing = p[1], p[2]
+    stem = value.stem
+    x = min(max(stem.x, state.x - closing * dt), state.x + opening * dt)
+    if x == stem.x:
+        return value
+    v = min(max(stem.v, -closing), opening)
+    limited = Stem(x, v, stem.direction, stem.armed)
+    return Motion(limited, value.p2, value.target, value.excess, value.rate, value.friction)
+
+
+EFFECT = Effect(
+    id='rate_limit',
+    title='Limited rate',
+    stage='p1-p2',
+    parameters=(
+        EffectParameter(
+            'pressure_rate',
+            'r_p',
+            '%/s',
+            5.0,
+            0.1,
+            UNLIMITED,
+            'log',
+            'Fastest change of p2, both ways',
+            neutral=UNLIMITED,
+        ),
+        EffectParameter(
+            'opening_rate',
+            'r_up',
+            '%/s',
+            UNLIMITED,
+            0.1,
+            UNLIMITED,
+            'log',
+            'Fastest opening of the stem',
+            neutral=UNLIMITED,
+        ),
+        EffectParameter(
+            'closing_rate',
+            'r_down',
+            '%/s',
+            UNLIMITED,
+            0.1,
+            UNLIMITED,
+            'log',
+            'Fastest closing of the stem',
+            neutral=UNLIMITED,
+        ),
+    ),
+    slots={'flow_slot': flow, 'motion_slot': motion},
+    longest_step=0.1,
+    order=40,
+    variants=(('pressure_rate',), ('opening_rate', 'closing_rate')),
+    explanation='A restriction, a damper or a small booster limits how fast p2 or the stem moves.',
+    symptom='Straight ramps of p2 or x whatever the size of the step.',
+    confirm='Compare steps of different sizes: the slopes are equal.',
+    twins={
+        'nonlinear_flow': 'a power law changes small steps too: small and large steps',
+    },
+)

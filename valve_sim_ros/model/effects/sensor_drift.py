@@ -1,0 +1,33 @@
+# Copyright 2026 The valve_sim_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Zero of the position sensor that drifts."""
+
+from typing import Any
+
+from numba import njit
+
+from ..declarations import Effect, EffectParameter
+
+
+@njit
+def sensor(value: float, state: Any, p: Any, memory: Any, dt: float) -> float:
+    """Return x with the drift so far."""
+    return value + p[0] * state.time / 3600.0
+
+
+EFFECT = Effect(
+    id='sensor_drift',
+    title='Drifting position sensor',
+    stage='sensor',
+    parameters=(
+        EffectParameter(
+            'rate', 'r', '%/h', 10.0, -400.0, 400.0, 'linear', 'Drift of measured x per hour'
+        ),
+    ),
+    slots={'sensor_slot': sensor},
+    order=30,
+    explanation='The zero of the position transmitter wanders, for instance with temperature.',
+    symptom='A slow trend in the residual of x.',
+    confirm='Return to the same stop after an hour.',
+    twins={'friction_drift': 'a drift of friction widens the band to both sides: slow reversals'},
+)

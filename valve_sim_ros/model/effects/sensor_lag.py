@@ -1,0 +1,40 @@
+# Copyright 2026 The valve_sim_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""First-order lag of the position sensor."""
+
+from typing import Any
+
+from numba import njit
+
+from ..declarations import Effect, EffectParameter
+from ..memory import lagged
+
+
+@njit
+def sensor(value: float, state: Any, p: Any, memory: Any, dt: float) -> float:
+    """Return x behind a lag, driven by the mean of x over the step."""
+    if state.time == 0.0:
+        memory[0] = memory[1] = value
+    memory[0] = lagged(memory[0], 0.5 * (memory[1] + value), p[0], dt)
+    memory[1] = value
+    return memory[0]
+
+
+EFFECT = Effect(
+    id='sensor_lag',
+    title='Slow position sensor',
+    stage='sensor',
+    parameters=(
+        EffectParameter(
+            'time_constant', 'tau', 's', 1.0, 0.0, 20.0, 'linear', 'Time constant of measured x'
+        ),
+    ),
+    slots={'sensor_slot': sensor},
+    memory=2,
+    longest_step=0.1,
+    order=10,
+    explanation='The position transmitter filters its signal.',
+    symptom='Measured slips are rounded.',
+    confirm='Move the sensor by hand, or read its damping setting.',
+    twins={'ip_lag': 'with x alone slow converters and slow sensors differ only at slips'},
+)

@@ -1,0 +1,89 @@
+# Copyright 2026 The valve_sim_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""What effects remember between steps: delayed signals, plays and lags."""
+
+import math
+from typing import Any
+
+from numba import njit
+
+DELAY_SIZE = 4099
+"""Numbers that a delayed signal needs: up to 2,048 changes on their way."""
+
+
+@njit
+def delayed(value: float, now: float, delay: float, memory: Any) -> tuple[float, float, float]:
+    """Return a held signal `delay` seconds ago, the value before that, and when it changed.
+
+    Parameters
+    ----------
+    value : float
+        Signal from `now` on.
+    now, delay : float
+        Time since the first sample and dead time [s].
+    memory : ndarray, shape (DELAY_SIZE,)
+        A ring of changes: their times and values, first and last, and the value before the first.
+
+    Returns
+    -------
+    float
+        Value in force at `now`.
+    float
+        Value in force before that.
+    float
+        When the one took over from the other [s]; minus infinity if nothing changed yet.
+    """
+    room = (DELAY_SIZE - 3) // 2
+    first, last = int(memory[0]), int(memory[1])
+    if now == 0.0:
+        memory[2] = memory[3] = value
+        memory[3 + room] = -math.inf
+    elif value != memory[3 + last]:
+        last = (last + 1) % room
+        memory[3 + last] = value
+        memory[3 + room + last] = now
+        if last == first:
+            first = (first + 1) % room
+    while first != last:
+        following = (first + 1) % room
+        if memory[3 + room + following] + delay > now + 1e-9:
+            break
+        memory[2] = memory[3 + first]
+        first = following
+    memory[0], memory[1] = first, last
+    return memory[3 + first], memory[2], memory[3 + room + first] + delay
+
+
+@njit
+def held_mean(before: float, after: float, changed: float, now: float, dt: float) -> float:
+    """Return the mean over the last `dt` seconds of a signal that `changed` once [s]."""
+    if dt <= 0.0 or changed <= now - dt:
+        return after
+    share = min(max((now - changed) / dt, 0.0), 1.0)
+    return before + share * (after - before)
+
+
+@njit
+def lagged(value: float, driven: float, time_constant: float, dt: float) -> float:
+    """Return `value` after `dt` seconds of a first-order lag towards `driven`."""
+    if time_constant <= 0.0:
+        return driven
+    return driven + (value - driven) * math.exp(-dt / time_constant)
+
+
+@njit
+def mean_of_plays(value: float, width: float, memory: Any, first: bool) -> float:
+    """Return the mean of plays of evenly spread half-widths up to `width`.
+
+    This is the Prandtl-Ishlinskii operator with a uniform density; `memory` holds one number per
+    play.
+    """
+    count = len(memory)
+    total = 0.0
+    for index in range(count):
+        half = width * (index + 1) / count
+        if first:
+            memory[index] = value
+        memory[index] = min(max(memory[index], value - half), value + half)
+        total += memory[index]
+    return total / count
