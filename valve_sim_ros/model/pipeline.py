@@ -19,6 +19,7 @@ from numba import njit
 import numpy as np
 import numpy.typing as npt
 
+from .borrowing import borrowed
 from .electro_pneumatic import backlash
 from .pneumatic import chamber_pressure, is_filling
 from .stem import forced_gain, free_motion, Friction, Poles, Stem, stem_poles, stem_step
@@ -261,6 +262,7 @@ def step(
 ) -> float:
     """Take the valve through one sample of `dt` seconds; arguments as for `run`, returns x."""
     parameters = theta_from(theta)
+    effects, memory = borrowed(effects), borrowed(memory)
     transition = transition_over(dt, parameters, finest)
     now, x = advance_sample(u, state_from(state), parameters, transition, effects, memory)
     for index, value in enumerate(now):
@@ -299,6 +301,7 @@ def run(
         Receives p1, p2, x [% of span].
     """
     parameters = theta_from(theta)
+    effects, memory = borrowed(effects), borrowed(memory)
     now = state_from(state)
     transition = transition_over(0.0, parameters, finest)
     uniform = dt.size == 1
