@@ -105,9 +105,15 @@ class Option:
 
 @dataclass(frozen=True)
 class EffectParameter(Parameter):
-    """A parameter of an effect; the effect is absent while all have their neutral value."""
+    """A parameter of an effect; the effect is absent while all have their neutral value.
+
+    `stage` says where this parameter acts if that differs from the effect's own stage; `starts`
+    are the values from which a search has to start where one start is not enough.
+    """
 
     neutral: float = 0.0
+    stage: str = ''
+    starts: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
         """Refuse a neutral value that is not legal."""

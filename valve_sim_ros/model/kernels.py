@@ -74,7 +74,7 @@ def kept(function: Any, slots: Mapping[str, Any], label: str) -> Any:
     """
     python = remake(function, njit, slots).py_func
     python.__qualname__ = f'{python.__name__}_{label}_{source_digest()}'
-    return njit(cache=True)(python)
+    return njit(cache=True, nogil=True)(python)
 
 
 def interpreted(function: Any, slots: Mapping[str, Any]) -> Any:
@@ -95,3 +95,10 @@ def make(effects: bool = False) -> Make:
         kept(pipeline.step, slots, label),
         interpreted(pipeline.step, slots),
     )
+
+
+@cache
+def scored() -> Any:
+    """Return `pipeline.run_scored` with the whole catalogue of effects."""
+    slots = {name: slot_function(name) for name in SLOTS}
+    return kept(pipeline.run_scored, slots, 'effects')

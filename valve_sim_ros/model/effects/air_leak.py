@@ -23,7 +23,15 @@ EFFECT = Effect(
     stage='p1-p2',
     parameters=(
         EffectParameter(
-            'leak_rate', 'k_l', '1/s', 0.01, 0.0, 5.0, 'linear', 'Loss of p2 per second and p2'
+            'leak_rate',
+            'k_l',
+            '1/s',
+            0.01,
+            0.0,
+            5.0,
+            'linear',
+            'Loss of p2 per second and p2',
+            starts=(0.003, 0.01, 0.04, 0.15),
         ),
     ),
     slots={'flow_slot': flow},

@@ -42,7 +42,17 @@ EFFECT = Effect(
     title='Chamber volume depends on the travel',
     stage='p1-p2',
     parameters=(
-        EffectParameter('ratio', 'kappa', '-', 1.0, 0.0, 10.0, 'linear', 'Swept over dead volume'),
+        EffectParameter(
+            'ratio',
+            'kappa',
+            '-',
+            1.0,
+            0.0,
+            10.0,
+            'linear',
+            'Swept over dead volume',
+            starts=(0.4, 1.2, 3.0),
+        ),
         EffectParameter(
             'displacement',
             'd',
@@ -53,6 +63,7 @@ EFFECT = Effect(
             'linear',
             'Share of the pressure change by the moving stem; 1 is isothermal air at an absolute '
             'pressure of 150 % of span where p2 = 0',
+            starts=(0.3, 0.9),
         ),
     ),
     slots={'flow_slot': flow, 'motion_slot': motion},

@@ -40,7 +40,15 @@ EFFECT = Effect(
     stage='p2-x',
     parameters=(
         EffectParameter(
-            'growth', 'g', '-', 0.5, 0.0, 5.0, 'linear', 'Relative growth of f_s after long rest'
+            'growth',
+            'g',
+            '-',
+            0.5,
+            0.0,
+            5.0,
+            'linear',
+            'Relative growth of f_s after long rest',
+            starts=(0.3, 1.0),
         ),
         EffectParameter(
             'time_constant',
@@ -52,6 +60,7 @@ EFFECT = Effect(
             'log',
             'Time at rest in which most of it grows',
             neutral=20.0,
+            starts=(5.0, 25.0),
         ),
     ),
     slots={'force_slot': force, 'motion_slot': motion},

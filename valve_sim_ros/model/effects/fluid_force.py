@@ -30,7 +30,15 @@ EFFECT = Effect(
     stage='p2-x',
     parameters=(
         EffectParameter(
-            'force', 'F_p', '%', 8.0, -40.0, 40.0, 'linear', 'Closing force at the seat'
+            'force',
+            'F_p',
+            '%',
+            8.0,
+            -40.0,
+            40.0,
+            'linear',
+            'Closing force at the seat',
+            starts=(-12.0, -5.0, 5.0, 12.0),
         ),
         EffectParameter(
             'reach',
@@ -42,6 +50,7 @@ EFFECT = Effect(
             'log',
             'Opening over which it falls to 37 %',
             neutral=30.0,
+            starts=(20.0,),
         ),
     ),
     slots={'force_slot': force},

@@ -38,6 +38,7 @@ EFFECT = Effect(
             0.95,
             'linear',
             'Opening friction is 1 + d, closing friction 1 - d times the mean',
+            starts=(-0.5, -0.2, 0.2, 0.5),
         ),
     ),
     slots={'force_slot': force},

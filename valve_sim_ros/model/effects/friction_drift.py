@@ -30,7 +30,15 @@ EFFECT = Effect(
     stage='p2-x',
     parameters=(
         EffectParameter(
-            'rate', 'k', '1/h', 1.0, -60.0, 60.0, 'linear', 'Relative change of friction per hour'
+            'rate',
+            'k',
+            '1/h',
+            1.0,
+            -60.0,
+            60.0,
+            'linear',
+            'Relative change of friction per hour',
+            starts=(-3.0, -1.0, 1.0, 3.0, 7.0),
         ),
     ),
     slots={'force_slot': force},

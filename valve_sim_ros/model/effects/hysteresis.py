@@ -52,6 +52,8 @@ EFFECT = Effect(
             30.0,
             'linear',
             'Half-width of the widest play that x passes through',
+            stage='p2-x',
+            starts=(2.0, 6.0),
         ),
     ),
     slots={'inlet_slot': inlet, 'sensor_slot': sensor},

@@ -41,7 +41,15 @@ EFFECT = Effect(
     stage='u-p1',
     parameters=(
         EffectParameter(
-            'dead_time', 'T_d', 's', 0.6, 0.0, 20.0, 'linear', 'Time by which p1 follows u late'
+            'dead_time',
+            'T_d',
+            's',
+            0.6,
+            0.0,
+            20.0,
+            'linear',
+            'Time by which p1 follows u late',
+            starts=(0.2, 0.5, 1.0, 2.0, 3.0),
         ),
     ),
     slots={'command_slot': command, 'inlet_slot': inlet, 'tubing_slot': tubing},

@@ -26,7 +26,15 @@ EFFECT = Effect(
     stage='u-p1',
     parameters=(
         EffectParameter(
-            'time_constant', 'tau', 's', 1.0, 0.0, 20.0, 'linear', 'Time constant of p1 after u'
+            'time_constant',
+            'tau',
+            's',
+            1.0,
+            0.0,
+            20.0,
+            'linear',
+            'Time constant of p1 after u',
+            starts=(0.2, 0.7, 2.0),
         ),
     ),
     slots={'inlet_slot': inlet},

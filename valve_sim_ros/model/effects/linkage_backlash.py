@@ -25,7 +25,15 @@ EFFECT = Effect(
     stage='sensor',
     parameters=(
         EffectParameter(
-            'width', 'b', '%', 1.5, 0.0, 20.0, 'linear', 'Play between stem and sensor'
+            'width',
+            'b',
+            '%',
+            1.5,
+            0.0,
+            20.0,
+            'linear',
+            'Play between stem and sensor',
+            starts=(0.6, 1.5, 3.5),
         ),
     ),
     slots={'sensor_slot': sensor},

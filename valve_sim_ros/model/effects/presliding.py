@@ -55,6 +55,7 @@ EFFECT = Effect(
             3.0,
             'linear',
             'Elastic travel of the stuck stem per force, relative to that of the spring',
+            starts=(0.1, 0.35),
         ),
     ),
     slots={'motion_slot': motion},

@@ -40,6 +40,7 @@ EFFECT = Effect(
             'log',
             'How much faster p2 falls above the threshold',
             neutral=1.0,
+            starts=(2.0, 5.0),
         ),
         EffectParameter(
             'threshold',
@@ -51,6 +52,7 @@ EFFECT = Effect(
             'log',
             'p2 - p1 above which the exhaust opens',
             neutral=8.0,
+            starts=(4.0, 8.0, 15.0),
         ),
     ),
     slots={'flow_slot': flow},

@@ -55,6 +55,7 @@ EFFECT = Effect(
             'log',
             'Fastest change of p2, both ways',
             neutral=UNLIMITED,
+            starts=(1.5, 4.0, 10.0, 25.0),
         ),
         EffectParameter(
             'opening_rate',
@@ -66,6 +67,8 @@ EFFECT = Effect(
             'log',
             'Fastest opening of the stem',
             neutral=UNLIMITED,
+            stage='p2-x',
+            starts=(1.5, 4.0, 10.0, 25.0),
         ),
         EffectParameter(
             'closing_rate',
@@ -77,6 +80,8 @@ EFFECT = Effect(
             'log',
             'Fastest closing of the stem',
             neutral=UNLIMITED,
+            stage='p2-x',
+            starts=(1.5, 4.0, 10.0, 25.0),
         ),
     ),
     slots={'flow_slot': flow, 'motion_slot': motion},

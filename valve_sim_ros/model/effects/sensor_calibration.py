@@ -21,10 +21,27 @@ EFFECT = Effect(
     stage='sensor',
     parameters=(
         EffectParameter(
-            'zero', 'x_0', '%', 3.0, -30.0, 30.0, 'linear', 'Measured x where it should be 0'
+            'zero',
+            'x_0',
+            '%',
+            3.0,
+            -30.0,
+            30.0,
+            'linear',
+            'Measured x where it should be 0',
+            starts=(-3.0, 0.0, 3.0),
         ),
         EffectParameter(
-            'span', 's', '-', 1.0, 0.5, 2.0, 'linear', 'Change of measured per true x', neutral=1.0
+            'span',
+            's',
+            '-',
+            1.0,
+            0.5,
+            2.0,
+            'linear',
+            'Change of measured per true x',
+            neutral=1.0,
+            starts=(0.9, 1.0, 1.1),
         ),
     ),
     slots={'sensor_slot': sensor},

@@ -21,7 +21,15 @@ EFFECT = Effect(
     stage='sensor',
     parameters=(
         EffectParameter(
-            'rate', 'r', '%/h', 10.0, -400.0, 400.0, 'linear', 'Drift of measured x per hour'
+            'rate',
+            'r',
+            '%/h',
+            10.0,
+            -400.0,
+            400.0,
+            'linear',
+            'Drift of measured x per hour',
+            starts=(-25.0, -8.0, 8.0, 25.0),
         ),
     ),
     slots={'sensor_slot': sensor},

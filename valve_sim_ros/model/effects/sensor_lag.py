@@ -26,7 +26,15 @@ EFFECT = Effect(
     stage='sensor',
     parameters=(
         EffectParameter(
-            'time_constant', 'tau', 's', 1.0, 0.0, 20.0, 'linear', 'Time constant of measured x'
+            'time_constant',
+            'tau',
+            's',
+            1.0,
+            0.0,
+            20.0,
+            'linear',
+            'Time constant of measured x',
+            starts=(0.2, 0.7, 2.0),
         ),
     ),
     slots={'sensor_slot': sensor},

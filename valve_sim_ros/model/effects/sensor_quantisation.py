@@ -22,7 +22,15 @@ EFFECT = Effect(
     stage='sensor',
     parameters=(
         EffectParameter(
-            'step', 'q', '%', 1.0, 0.0, 10.0, 'linear', 'Smallest change of measured x'
+            'step',
+            'q',
+            '%',
+            1.0,
+            0.0,
+            10.0,
+            'linear',
+            'Smallest change of measured x',
+            starts=(0.3, 0.7, 1.5, 3.0),
         ),
     ),
     slots={'sensor_slot': sensor},

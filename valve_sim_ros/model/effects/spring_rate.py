@@ -34,6 +34,7 @@ EFFECT = Effect(
             'log',
             'Spring force per travel, relative to nominal',
             neutral=1.0,
+            starts=(0.65, 0.8, 0.9, 1.12, 1.25, 1.5),
         ),
     ),
     slots={'force_slot': force},

@@ -32,7 +32,15 @@ EFFECT = Effect(
     stage='p2-x',
     parameters=(
         EffectParameter(
-            'velocity', 'v_s', '%/s', 5.0, 0.0, 100.0, 'linear', 'Speed at which friction falls'
+            'velocity',
+            'v_s',
+            '%/s',
+            5.0,
+            0.0,
+            100.0,
+            'linear',
+            'Speed at which friction falls',
+            starts=(1.0, 4.0, 15.0),
         ),
     ),
     slots={'force_slot': force},

@@ -30,6 +30,7 @@ EFFECT = Effect(
             'linear',
             'Highest p1 that the supply can give',
             neutral=150.0,
+            starts=(40.0, 50.0, 60.0, 70.0, 80.0, 90.0, 97.0),
         ),
     ),
     slots={'inlet_slot': inlet},

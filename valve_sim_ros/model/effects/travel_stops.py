@@ -39,6 +39,7 @@ EFFECT = Effect(
             'linear',
             'Lowest position',
             neutral=-FAR,
+            starts=(0.0, 8.0, 15.0, 22.0, 30.0, 40.0),
         ),
         EffectParameter(
             'upper',
@@ -50,6 +51,7 @@ EFFECT = Effect(
             'linear',
             'Highest position',
             neutral=100.0 + FAR,
+            starts=(50.0, 58.0, 66.0, 74.0, 82.0, 90.0, 97.0),
         ),
     ),
     slots={'motion_slot': motion},

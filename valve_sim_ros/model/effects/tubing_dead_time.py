@@ -24,7 +24,15 @@ EFFECT = Effect(
     stage='p1-p2',
     parameters=(
         EffectParameter(
-            'dead_time', 'T_d', 's', 0.6, 0.0, 20.0, 'linear', 'Time by which p2 follows p1 late'
+            'dead_time',
+            'T_d',
+            's',
+            0.6,
+            0.0,
+            20.0,
+            'linear',
+            'Time by which p2 follows p1 late',
+            starts=(0.2, 0.5, 1.0, 2.0, 3.0),
         ),
     ),
     slots={'tubing_slot': tubing},

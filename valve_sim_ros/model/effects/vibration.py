@@ -26,7 +26,15 @@ EFFECT = Effect(
     stage='p2-x',
     parameters=(
         EffectParameter(
-            'amplitude', 'A', '%', 2.0, 0.0, 20.0, 'linear', 'Amplitude of the periodic force'
+            'amplitude',
+            'A',
+            '%',
+            2.0,
+            0.0,
+            20.0,
+            'linear',
+            'Amplitude of the periodic force',
+            starts=(0.7, 2.5),
         ),
         EffectParameter(
             'frequency',
@@ -40,7 +48,15 @@ EFFECT = Effect(
             neutral=0.2,
         ),
         EffectParameter(
-            'phase', 'phi', 'rad', 0.0, -3.1416, 3.1416, 'linear', 'Phase at the first sample'
+            'phase',
+            'phi',
+            'rad',
+            0.0,
+            -3.1416,
+            3.1416,
+            'linear',
+            'Phase at the first sample',
+            starts=(-2.4, -0.8, 0.8, 2.4),
         ),
     ),
     slots={'force_slot': force},

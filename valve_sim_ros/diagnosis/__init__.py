@@ -1,0 +1,3 @@
+# Copyright 2026 The valve_sim_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Find where model and measurement disagree, name the missing effect, add it, show the gap."""

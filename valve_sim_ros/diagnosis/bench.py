@@ -1,0 +1,295 @@
+# Copyright 2026 The valve_sim_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""A recording on the test bench: any valve run beside it, and what is left of each signal."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..model.composition import compose
+from ..model.kernels import scored
+from ..model.parameters import DELTA
+from ..model.pipeline import Array, State
+from ..recordings.recording import OUTPUTS, Recording
+
+OUTLIER = 6.0
+"""A single value further than this from both its neighbours is an outlier [noise]."""
+KEPT_GRIDS = 60
+JITTER = 0.1
+"""Uncertainty of when a sample was taken, as a share of the period."""
+TRAVEL, MOST_UNSETTLED = 8.0, 0.1
+"""A record counts once the valve has travelled this far [%], and after this share at the latest."""
+REST = 5
+"""Samples over which two means agree while the stem rests."""
+LEAST_NOISE = 0.02
+"""Smallest noise taken seriously [% of span]."""
+
+
+class Grid(NamedTuple):
+    """A stretch as the compiled model receives it: m samples and changes of the command.
+
+    u, dt, nothing have shape (m,), forced (3, m), rows (n,); targets and scales hold (m,) per
+    signal.
+    """
+
+    u: Array
+    dt: Array
+    rows: Array
+    forced: Array
+    targets: dict[str, Array]
+    scales: dict[str, Array]
+    nothing: Array
+
+
+@dataclass
+class Stretch:
+    """A run of samples without a gap, shape (n,) each; outputs are NaN where lost.
+
+    `counts` are the measured outputs where they count, `noise` their uncertainty, `rests` x
+    where it rests.
+    """
+
+    time: Array
+    u: Array
+    measured: dict[str, Array]
+    counts: dict[str, Array] = field(default_factory=dict)
+    noise: dict[str, Array] = field(default_factory=dict)
+    rests: Array = field(default_factory=lambda: np.empty(0))
+    _grids: dict[Any, Grid] = field(default_factory=dict)
+
+    def grid(self, phase: float, drive: tuple[str, ...]) -> Grid:
+        """Return the stretch with the commands moved by a share of a period.
+
+        With `phase` > 0 a change of u that the recording shows at a sample came that share of a
+        period earlier, with `phase` < 0 later.
+        """
+        key = round(phase, 4), drive
+        if key not in self._grids:
+            if len(self._grids) > KEPT_GRIDS:
+                self._grids.clear()
+            self._grids[key] = self._moved(*key)
+        return self._grids[key]
+
+    def recount(self, counts: Mapping[str, Array]) -> None:
+        """Replace what counts."""
+        self.counts = dict(counts)
+        self._grids.clear()
+
+    def _moved(self, phase: float, drive: tuple[str, ...]) -> Grid:
+        n = self.time.size
+        changed = np.flatnonzero(np.diff(self.u)) + 1
+        seen = self.u
+        if phase > 0.0:
+            extra = self.time[changed] - phase * (self.time[changed] - self.time[changed - 1])
+        elif phase < 0.0:
+            seen = np.concatenate([self.u[:1], self.u[:-1]])
+            step = np.diff(self.time, append=2 * self.time[-1] - self.time[-2])
+            extra = self.time[changed] - phase * step[changed]
+        else:
+            changed, extra = changed[:0], self.time[:0]
+        time = np.concatenate([self.time, extra])
+        order = np.argsort(time, kind='stable')
+        rows = np.empty(time.size, dtype=np.intp)
+        rows[order] = np.arange(time.size)
+        rows = rows[:n]
+        forced, nothing = np.full((3, time.size), np.nan), np.full(time.size, np.nan)
+        for name in drive:
+            seen_there = self.rests if name == 'x' else self.measured[name]
+            forced[OUTPUTS.index(name), rows] = seen_there
+        targets, scales = {}, {}
+        for name, values in self.counts.items():
+            targets[name], scales[name] = nothing.copy(), nothing.copy()
+            targets[name][rows] = values
+            scales[name][rows] = 1.0 / self.noise[name]
+        return Grid(
+            np.concatenate([seen, self.u[changed]])[order],
+            np.diff(time[order], prepend=time[order][:1]),
+            rows,
+            forced,
+            targets,
+            scales,
+            nothing,
+        )
+
+
+class Bench:
+    """All stretches of all recordings, the noise of each signal, and which samples count."""
+
+    def __init__(self, recordings: Sequence[Recording]) -> None:
+        """Cut the recordings into stretches and look at the noise."""
+        self.signals = tuple(
+            name for name in OUTPUTS if all(name in recording.signals for recording in recordings)
+        )
+        self.stretches = [
+            Stretch(
+                recording.time[part] - recording.time[part][0],
+                np.array(recording.u[part]),
+                {name: np.array(recording.output(name)[part]) for name in self.signals},
+            )
+            for recording in recordings
+            for part in recording.segments
+            if part.stop - part.start > 20
+        ]
+        self.noise = {name: self._noise(name) for name in self.signals}
+        for stretch in self.stretches:
+            for name, values in stretch.measured.items():
+                values[_wild(values, OUTLIER * self.noise[name])] = np.nan
+            stretch.noise = {n: self._uncertainty(n, v) for n, v in stretch.measured.items()}
+            settled = np.arange(stretch.u.size) >= self._settled(stretch)
+            stretch.recount({n: np.where(settled, v, np.nan) for n, v in stretch.measured.items()})
+            if 'x' in self.signals:
+                stretch.rests = _rests(stretch.measured['x'], self.noise['x'])
+        self.size = sum(stretch.u.size for stretch in self.stretches)
+
+    def run(
+        self,
+        values: Mapping[str, float],
+        effects: Sequence[str] = (),
+        drive: Sequence[str] = (),
+        coarse: float = 0.0,
+    ) -> list[Array]:
+        """Return p1, p2, x of a valve, shape (3, n) per stretch.
+
+        Parameters
+        ----------
+        values : mapping of str to float
+            Parameters of the valve and its effects, `phase`, and starting values
+            ``p1_0``, ``p2_0``, ``x_0`` per stretch (``p1_0.1`` for the second).
+        effects : sequence of str
+            The effects in force.
+        drive : sequence of str
+            Signals that later stages receive as measured; with x, the stem is put where it was
+            seen to rest, so that a slip missed by the model does not spoil the next one.
+        coarse : float
+            Take steps of up to this length [s] even where the effects ask for shorter ones.
+        """
+        return self._run(values, effects, drive, coarse, 'x', math.inf)[0]
+
+    def score(
+        self,
+        values: Mapping[str, float],
+        effects: Sequence[str],
+        signal: str,
+        drive: Sequence[str] = (),
+        coarse: float = 0.0,
+        bound: float = math.inf,
+    ) -> float:
+        """Return the robust sum of squares of a signal over its noise, or more than `bound`."""
+        return self._run(values, effects, drive, coarse, signal, bound)[1]
+
+    def _run(
+        self,
+        values: Mapping[str, float],
+        effects: Sequence[str],
+        drive: Sequence[str],
+        coarse: float,
+        signal: str,
+        bound: float,
+    ) -> tuple[list[Array], float]:
+        composition = compose(effects, values)
+        theta = np.array([*(values[name] for name in THETA), DELTA.default, 0.0])
+        results, score = [], 0.0
+        for index, stretch in enumerate(self.stretches):
+            grid = stretch.grid(values.get('phase', 0.0), tuple(drive))
+            outputs = np.empty((3, grid.u.size))
+            score += scored()(
+                grid.u,
+                grid.dt,
+                self.start(index, values),
+                theta,
+                max(composition.finest, coarse),
+                composition.effects,
+                np.zeros(composition.memory_size),
+                grid.forced,
+                outputs,
+                OUTPUTS.index(signal),
+                grid.targets.get(signal, grid.nothing),
+                grid.scales.get(signal, grid.nothing),
+                bound - score,
+            )
+            results.append(outputs[:, grid.rows])
+            if score > bound:
+                break
+        return results, score
+
+    def start(self, index: int, values: Mapping[str, float]) -> Any:
+        """Return the state before a stretch: as fitted, else as measured."""
+        suffix = f'.{index}' if index else ''
+        stretch = self.stretches[index]
+        found, fallback = {}, stretch.u[0]
+        for name in OUTPUTS:
+            if name in stretch.measured:
+                fallback = float(np.nanmedian(stretch.measured[name][:3]))
+            found[name] = values.get(f'{name}_0{suffix}', fallback)
+        p1, p2, x = found.values()
+        return np.array(State(p1, p2, x, 0.0, 0.0, 0.0, play=p1, command=p1, time=0.0))
+
+    def residual(self, results: Sequence[Array], name: str) -> Array:
+        """Return measured minus model of a signal over its noise, NaN where not counted."""
+        row = OUTPUTS.index(name)
+        return np.concatenate(
+            [
+                (stretch.counts[name] - result[row]) / stretch.noise[name]
+                for stretch, result in zip(self.stretches, results, strict=True)
+            ]
+        )
+
+    def joined(self, name: str) -> Array:
+        """Return u or an output over all stretches."""
+        return np.concatenate([s.u if name == 'u' else s.measured[name] for s in self.stretches])
+
+    def _uncertainty(self, name: str, values: Array) -> Array:
+        """Return the noise of each sample, more where the signal moves: sample times jitter."""
+        steps = np.abs(np.diff(values, prepend=values[:1], append=values[-1:]))
+        slope = np.nan_to_num(np.fmax(steps[:-1], steps[1:]))
+        noise = self.noise[name]
+        slope = np.maximum(slope - 2.0 * noise, 0.0)
+        return np.sqrt(noise**2 + (JITTER * slope) ** 2)
+
+    def _settled(self, stretch: Stretch) -> int:
+        """Return the first sample by which the unknown state before the record is forgotten.
+
+        Plays and friction forget it as the valve travels: the last signal is watched.
+        """
+        values = stretch.measured[self.signals[-1]]
+        known = np.flatnonzero(np.isfinite(values))
+        moved = np.abs(values[known] - values[known[0]]) > max(
+            TRAVEL, OUTLIER * self.noise[self.signals[-1]]
+        )
+        first = int(known[np.argmax(moved)]) + 10 if moved.any() else 0
+        return min(first, int(MOST_UNSETTLED * values.size))
+
+    def _noise(self, name: str) -> float:
+        """Return the noise of a signal [% of span] from its second differences, robustly."""
+        bends = np.concatenate([np.diff(s.measured[name], 2) for s in self.stretches])
+        bends = np.abs(bends[np.isfinite(bends)])
+        spread = float(np.median(bends)) / (0.6745 * np.sqrt(6.0)) if bends.size else 0.0
+        return max(spread, LEAST_NOISE)
+
+
+THETA = ('f_d1', 'T_g1', 'T_g2', 'f_s', 'f_d', 'a_1', 'a_2')
+
+
+def _wild(values: Array, limit: float) -> Array:
+    """Return which single values lie further than `limit` from the middle of three."""
+    wild = np.zeros(values.size, dtype=bool)
+    three = np.stack([values[:-2], values[1:-1], values[2:]])
+    wild[1:-1] = np.abs(values[1:-1] - np.median(three, axis=0)) > limit
+    return wild
+
+
+def _rests(x: Array, noise: float) -> Array:
+    """Return where x rests, its mean over the last REST samples; NaN elsewhere."""
+    known = np.nan_to_num(x, nan=np.nanmedian(x))
+    total = np.concatenate([[0.0], np.cumsum(known)])
+    mean = (total[REST:] - total[:-REST]) / REST
+    rests = np.full(x.size, np.nan)
+    ends = np.arange(2 * REST - 1, x.size)
+    still = np.abs(mean[ends - REST + 1] - mean[ends - 2 * REST + 1]) < 2.0 * noise * np.sqrt(
+        2.0 / REST
+    )
+    rests[ends[still]] = mean[ends - REST + 1][still]
+    return rests

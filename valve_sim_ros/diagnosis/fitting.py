@@ -1,0 +1,315 @@
+# Copyright 2026 The valve_sim_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Fits of one group of stages: the base valve, and the base valve with a candidate effect."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import product
+import math
+
+import numpy as np
+from scipy.signal import periodogram
+
+from ..model.pipeline import Array
+from .bench import Bench
+from .descent import descend, walk
+from .evolution import evolve
+from .stages import Candidate, Group
+from .unknowns import complete, EARLY, LATE, PHASE, to_point, to_values, Unknown
+
+START: dict[str, float] = {
+    'f_d1': 0.5,
+    'T_g1': 5.0,
+    'T_g2': 5.0,
+    'f_s': 4.0,
+    'f_d/f_s': 0.6,
+    'a_1/a_2': 10.0,
+    'phase': 0.0,
+}
+GRID: dict[str, tuple[float, ...]] = {
+    'f_d1': (0.1, 0.5, 1.5, 4.0),
+    'T_g1': (0.7, 2.5, 8.0, 25.0),
+    'T_g2': (0.7, 2.5, 8.0, 25.0),
+    'f_s': (0.5, 1.5, 3.5, 7.0, 12.0),
+    'f_d/f_s': (0.35, 0.75),
+}
+"""Where the search for the base valve starts."""
+
+
+SHORT = 4
+"""Steps of a descent that only shows where it leads."""
+SCREENING, COARSE = 0.1, 0.04
+"""Steps inside a sample while candidates are screened, and fitted [s]."""
+SPREAD = 5.0
+"""Standard deviation with which an evolution begins [steps of the unknowns]."""
+POPULATION = 10
+ROUNDS = ((40, 10), (12, 16), (5, 30))
+"""Rounds of a race where costs are rugged: how many still run, and for how many generations."""
+FINISHERS = 5
+""" So many are refitted to the end."""
+
+
+@dataclass(frozen=True)
+class Valve:
+    """A fitted valve: values of all unknowns, effects in force, what they may vary, its cost."""
+
+    values: Mapping[str, float]
+    effects: tuple[str, ...] = ()
+    freed: tuple[Unknown, ...] = ()
+    candidates: tuple[Candidate, ...] = ()
+    cost: float = math.inf
+
+
+@dataclass
+class Fitter:
+    """Fits valves to what a bench has measured."""
+
+    bench: Bench
+    phase: Unknown = PHASE
+    seed: int = 0
+    evaluations: int = 0
+
+    def unknowns(self, group: Group) -> tuple[Unknown, ...]:
+        """Return what a fit of the base valve varies in a group."""
+        return group.unknowns(len(self.bench.stretches), self.phase)
+
+    def residuals(
+        self, valve: Valve, signal: str, drive: Sequence[str] = (), coarse: float = 0.0
+    ) -> Array:
+        """Return the residuals of a signal over its noise, 0 where they do not count."""
+        self.evaluations += 1
+        results = self.bench.run(complete(valve.values), valve.effects, drive, coarse)
+        return np.nan_to_num(self.bench.residual(results, signal))
+
+    def score(
+        self,
+        valve: Valve,
+        signal: str,
+        drive: Sequence[str] = (),
+        coarse: float = 0.0,
+        bound: float = math.inf,
+    ) -> float:
+        """Return the robust sum of squares of a signal over its noise, or more than `bound`."""
+        self.evaluations += 1
+        return self.bench.score(
+            complete(valve.values), valve.effects, signal, drive, coarse, bound
+        )
+
+    def fit(
+        self, valve: Valve, problem: 'Problem', most: int = 20, coarse: float = COARSE
+    ) -> Valve:
+        """Return the valve at the bottom of the valley in which it stands."""
+        unknowns, signal, drive = problem
+
+        def residuals(point: Array) -> Array:
+            there = replace(valve, values=to_values(unknowns, point, valve.values))
+            return self.residuals(there, signal, drive, coarse)
+
+        def score(point: Array, bound: float) -> float:
+            there = replace(valve, values=to_values(unknowns, point, valve.values))
+            return self.score(there, signal, drive, coarse, bound)
+
+        found = descend(residuals, to_point(unknowns, valve.values), most)
+        if most > SHORT:
+            found = walk(score, found)
+        return replace(
+            valve, values=to_values(unknowns, found.point, valve.values), cost=found.cost
+        )
+
+    def evolve(
+        self,
+        valve: Valve,
+        problem: 'Problem',
+        generations: int,
+        spread: float = SPREAD,
+        coarse: float = SCREENING,
+    ) -> Valve:
+        """Return the best valve that evolution finds around this one."""
+        unknowns, signal, drive = problem
+
+        def score(point: Array, bound: float) -> float:
+            there = replace(valve, values=to_values(unknowns, point, valve.values))
+            return self.score(there, signal, drive, coarse, bound)
+
+        found = evolve(
+            score,
+            to_point(unknowns, valve.values),
+            spread,
+            np.random.default_rng(self.seed),
+            generations,
+            POPULATION,
+        )
+        return replace(
+            valve, values=to_values(unknowns, found.point, valve.values), cost=found.cost
+        )
+
+    def base(self, group: Group, valve: Valve, drive: Sequence[str]) -> Valve:
+        """Find the base valve's values in one group from a grid, `drive` as measured."""
+        if group.stages == ('u-p1',) and drive == group.drive:
+            self._settle_phase(group, valve)
+            valve = replace(valve, values={**valve.values, 'phase': self.phase_start})
+        problem = (self.unknowns(group), group.signal, tuple(drive))
+        starts = [valve.values, *({**valve.values, **there} for there in grid(problem[0]))]
+        found = self._best_of(valve, starts, problem, 3)
+        if 'p2-x' in group.stages:
+            found += [self.evolve(each, problem, 30, coarse=COARSE) for each in found]
+        return self.refined(min(found, key=_cost), problem)
+
+    def refined(self, valve: Valve, problem: 'Problem') -> Valve:
+        """Return a valve after descents and, where costs are rugged, evolutions in turn."""
+        valve = self.fit(valve, problem)
+        while 'f_s' in (unknown.name for unknown in problem[0]):
+            more = self.fit(self.evolve(valve, problem, 30, spread=2.0, coarse=COARSE), problem)
+            if more.cost > 0.99 * valve.cost:
+                return min(valve, more, key=_cost)
+            valve = more
+        return valve
+
+    def race(
+        self,
+        group: Group,
+        valve: Valve,
+        candidates: Sequence[Candidate],
+        progress: Callable[[float], object] = lambda share: None,
+    ) -> list[Valve]:
+        """Return valves with one more effect, best first, the more refitted the better they are.
+
+        Raises
+        ------
+        ValueError
+            If there are no candidates.
+        """
+        rugged = 'p2-x' in group.stages
+        residual = self.residuals(valve, group.signal) if rugged else np.zeros(0)
+        runners = []
+        for index, candidate in enumerate(candidates):
+            runners.append(self._screen(candidate, group, valve, residual))
+            progress(0.5 * (index + 1) / len(candidates))
+        for left, generations in ROUNDS if rugged else ():
+            runners = sorted(runners, key=_cost)
+            for index, runner in enumerate(runners[:left]):
+                problem = self.problem(group, runner)
+                more = self.evolve(runner, problem, generations)
+                runners[index] = min(runner, more, key=_cost)
+        runners = sorted(runners, key=_cost)
+        for index, runner in enumerate(runners[:FINISHERS]):
+            runners[index] = self.fit(runner, self.problem(group, runner))
+            progress(0.5 + 0.5 * (index + 1) / FINISHERS)
+        runners = sorted(runners, key=_cost)
+        if rugged:
+            runners[0] = self.refined(runners[0], self.problem(group, runners[0]))
+        return sorted(runners, key=_cost)
+
+    def rebased(self, group: Group, valve: Valve, runners: Sequence[Valve]) -> Valve:
+        """Return the valve without a further effect, refitted from where the runners ended."""
+        problem = self.problem(group, valve)
+        names = [unknown.name for unknown in problem[0]]
+        there = [
+            replace(valve, values={**valve.values, **{name: r.values[name] for name in names}})
+            for r in runners
+        ]
+        costs = [self.score(each, group.signal, (), COARSE) for each in there]
+        best = there[int(np.argmin(costs))]
+        return min(valve, self.fit(best, problem), key=_cost)
+
+    def problem(self, group: Group, valve: Valve) -> 'Problem':
+        """Return what a refit of a valve varies in a group, driven by the model itself."""
+        return (*self.unknowns(group), *valve.freed), group.signal, ()
+
+    @property
+    def phase_start(self) -> float:
+        """A phase to start from."""
+        return min(max(0.0, self.phase.lower), self.phase.upper)
+
+    def _screen(self, candidate: Candidate, group: Group, valve: Valve, residual: Array) -> Valve:
+        """Return the valve with one more effect after a short refit of its group."""
+        there = replace(
+            valve,
+            effects=tuple(dict.fromkeys((*valve.effects, candidate.effect))),
+            freed=(*valve.freed, *candidate.unknowns),
+            candidates=(*valve.candidates, candidate),
+        )
+        starts = [
+            {**candidate.neutral, **valve.values, **base, **start}
+            for base in ({}, *friction_grid(group))
+            for start in candidate.starts(self._peaks(residual))
+        ]
+        problem = self.problem(group, there)
+        count = 1 if 'p2-x' in group.stages else 2
+        return self._best_of(there, starts, problem, count, SCREENING)[0]
+
+    def _peaks(self, residual: Array) -> tuple[float, ...]:
+        """Return the frequencies at which a residual swings most [Hz]."""
+        if not residual.size:
+            return ()
+        period = float(np.median(np.diff(self.bench.stretches[0].time)))
+        frequency, power = periodogram(residual, 1.0 / period)
+        inside = (frequency > 0.02) & (frequency < 0.45 / period)
+        return tuple(frequency[inside][np.argsort(-power[inside])[:3]])
+
+    def _settle_phase(self, group: Group, valve: Valve) -> None:
+        """Find out whether p1 answers at the sample that shows the command or at the next."""
+        costs = []
+        problem = (self.unknowns(group), group.signal, group.drive)
+        for phase in (EARLY, LATE):
+            values = {**valve.values, 'phase': min(phase.upper, 0.0)}
+            starts = [{**values, **there} for there in grid(problem[0])]
+            costs.append(self._best_of(valve, starts, problem, 1)[0].cost)
+        self.phase = EARLY if costs[0] <= costs[1] else LATE
+
+    def _best_of(
+        self,
+        valve: Valve,
+        starts: Sequence[Mapping[str, float]],
+        problem: 'Problem',
+        count: int,
+        coarse: float = COARSE,
+    ) -> list[Valve]:
+        """Try starts, descend a little from the best of them, and order what comes out."""
+        _, signal, drive = problem
+        tried: list[Valve] = []
+        bound = math.inf
+        for start in starts:
+            there = replace(valve, values=start)
+            cost = self.score(there, signal, drive, coarse, bound)
+            tried.append(replace(there, cost=cost))
+            tried.sort(key=_cost)
+            bound = tried[count].cost if len(tried) > count else math.inf
+        fits = [self.fit(there, problem, SHORT, coarse) for there in tried[:count]]
+        return sorted(fits, key=_cost)
+
+
+Problem = tuple[tuple[Unknown, ...], str, tuple[str, ...]]
+"""What a fit varies, the signal it looks at, and the signals that drive the stages."""
+
+
+def _cost(valve: Valve) -> float:
+    """Return what to sort by."""
+    return valve.cost
+
+
+def grid(unknowns: Sequence[Unknown]) -> list[dict[str, float]]:
+    """Return the starts of the base valve's unknowns."""
+    names = [unknown.name for unknown in unknowns if unknown.name in GRID]
+    return [dict(zip(names, point, strict=True)) for point in product(*(GRID[n] for n in names))]
+
+
+def friction_grid(group: Group) -> list[dict[str, float]]:
+    """Return starts of the friction, which a valve without the effect may have far off."""
+    if 'p2-x' not in group.stages:
+        return []
+    return [
+        {'f_s': f_s, 'f_d/f_s': share, 'a_1/a_2': START['a_1/a_2']}
+        for f_s in GRID['f_s']
+        for share in GRID['f_d/f_s']
+    ]
+
+
+def starting_valve(bench: Bench) -> Valve:
+    """Return a valve to start from, its starting values as measured."""
+    values = dict(START)
+    for index in range(len(bench.stretches)):
+        suffix = f'.{index}' if index else ''
+        p1, p2, x = bench.start(index, values)[:3]
+        values |= {f'p1_0{suffix}': p1, f'p2_0{suffix}': p2, f'x_0{suffix}': x}
+    return Valve(values)

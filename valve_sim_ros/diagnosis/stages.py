@@ -1,0 +1,108 @@
+# Copyright 2026 The valve_sim_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Groups of stages between measured signals, and the effects that may act in each."""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from itertools import product
+
+from ..model.declarations import EffectParameter
+from ..model.effects import CATALOGUE
+from .unknowns import BASE_UNKNOWNS, declared, of_effect, PHASE, start_of, Unknown
+
+STAGE_OF = {'p1': 'u-p1', 'p2': 'p1-p2', 'x': 'p2-x'}
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """One way in which one effect may act: the parameters that a fit frees."""
+
+    effect: str
+    names: tuple[str, ...]
+    stage: str
+
+    @property
+    def unknowns(self) -> tuple[Unknown, ...]:
+        """Coordinates of the freed parameters."""
+        return tuple(of_effect(self.effect, name) for name in self.names)
+
+    @property
+    def neutral(self) -> dict[str, float]:
+        """All parameters of the effect at their neutral values."""
+        return {f'{self.effect}.{p.name}': p.neutral for p in CATALOGUE[self.effect].parameters}
+
+    def starts(self, peaks: tuple[float, ...] = ()) -> list[dict[str, float]]:
+        """Return the values from which a search starts, the others neutral.
+
+        Frequencies start at the `peaks` [Hz] of what the base valve leaves over.
+        """
+        parameters = [declared(self.effect, name) for name in self.names]
+        each = [peaks if peaks and p.unit == 'Hz' else starts_of(p) for p in parameters]
+        names = [f'{self.effect}.{name}' for name in self.names]
+        return [
+            {**self.neutral, **dict(zip(names, values, strict=True))} for values in product(*each)
+        ]
+
+
+def starts_of(parameter: EffectParameter) -> tuple[float, ...]:
+    """Return the declared starts, or some around the default on both sides of the neutral."""
+    if parameter.starts:
+        return parameter.starts
+    neutral, default = parameter.neutral, parameter.default
+    if parameter.scale == 'log':
+        return tuple(
+            value
+            for value in (default / 4, default, 4 * default)
+            if parameter.lower <= value <= parameter.upper
+        )
+    size = abs(default - neutral) or 0.2 * (parameter.upper - neutral)
+    found = [neutral + share * size for share in (0.2, 0.6, 1.5)]
+    found += [neutral - share * size for share in (0.2, 0.6, 1.5)]
+    return tuple(v for v in found if parameter.lower <= v <= parameter.upper)
+
+
+@dataclass(frozen=True)
+class Group:
+    """The stages that lead from one measured signal, or u, to the next."""
+
+    signal: str
+    stages: tuple[str, ...]
+    drive: tuple[str, ...]
+
+    def unknowns(self, stretches: int, phase: Unknown = PHASE) -> tuple[Unknown, ...]:
+        """Return what a fit of the base valve varies here."""
+        base = [unknown for stage in self.stages for unknown in BASE_UNKNOWNS[stage]]
+        if self.stages != ('u-p1',) and not (len(self.stages) == 1 and self.signal == 'x'):
+            base.append(phase)
+        hidden = [name for name, stage in STAGE_OF.items() if stage in self.stages]
+        starts = [
+            start_of(f'{name}_0' + (f'.{index}' if index else ''))
+            for index in range(min(stretches, 3))
+            for name in hidden
+        ]
+        return (*base, *starts)
+
+    def candidates(self, without: Iterable[str] = ()) -> list[Candidate]:
+        """Return the candidates that act in these stages."""
+        acting = (*self.stages, 'sensor') if self.signal == 'x' else self.stages
+        found = []
+        for effect in CATALOGUE.values():
+            if effect.id in without:
+                continue
+            for names in effect.variants or (tuple(p.name for p in effect.parameters),):
+                stage = declared(effect.id, names[0]).stage or effect.stage
+                if stage in acting:
+                    found.append(Candidate(effect.id, names, stage))
+        return found
+
+
+def groups(signals: Sequence[str]) -> list[Group]:
+    """Return the groups for the measured signals, in the order of the flow."""
+    found, pending, seen = [], [], []
+    for name, stage in STAGE_OF.items():
+        pending.append(stage)
+        if name in signals:
+            found.append(Group(name, tuple(pending), tuple(seen)))
+            pending = []
+            seen = [*seen, name]
+    return found
