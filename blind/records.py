@@ -1,0 +1,179 @@
+# Copyright 2026 The valve_sim_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""One blind record: a random valve, its hidden effects, its commands, its recorder, its key."""
+
+from dataclasses import asdict, dataclass
+import json
+import os
+from pathlib import Path
+
+import numpy as np
+
+from .effects import Changes, EFFECTS
+from .excitations import commands
+from .physics import Physics
+from .plant import simulate, Trace
+from .recorder import draw_recorder, measured, Recorder, sample_times, write_bag, write_csv
+from .unknown import UNKNOWN
+from .valves import base_valve
+from .visibility import visible, WANTED
+
+Rng = np.random.Generator
+RUN_IN = 80.0
+"""Time before the record, so that it begins in an unknown state [s]."""
+CONTINUATION = 300.0
+"""Length of the record that nobody has seen [s]."""
+DRAWS = {**EFFECTS, **UNKNOWN}
+TRIES = 200
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What is simulated: the valve with and without its effects, and the commands.
+
+    Attributes
+    ----------
+    base : Physics
+        The valve without any effect.
+    changes : dict
+        By effect id, what it changes in the valve.
+    u : ndarray, shape (m,)
+        Commands [%], one per period, from the run-in to the end of the continuation.
+    length : float
+        Length of the record [s].
+    step : float
+        Step of the integrator [s].
+    """
+
+    base: Physics
+    changes: dict[str, Changes]
+    u: np.ndarray
+    length: float
+    step: float
+
+    def valve(self, without: str | None = None, all_effects: bool = True) -> Physics:
+        """Return the valve with all effects, all but one, or none."""
+        merged: Changes = {}
+        for name, each in self.changes.items():
+            if all_effects and name != without:
+                merged |= each
+        return self.base._replace(**merged)
+
+
+@dataclass(frozen=True)
+class Blind:
+    """A record, what is hidden in it, and how it was taken."""
+
+    plan: Plan
+    recorder: Recorder
+    times: np.ndarray
+    trace: Trace
+    visibility: dict[str, dict[str, float]]
+
+
+def draw_plan(rng: Rng, effects: tuple[str, ...], recorder: Recorder, step: float) -> Plan:
+    """Draw a valve, sizes of its effects and commands."""
+    base = base_valve(rng)
+    length = float(rng.integers(600, 901))
+    low, high = (rng.uniform(2.0, 20.0), rng.uniform(75.0, 98.0))
+    if rng.random() < 0.2:
+        low, high = rng.uniform(10.0, 30.0), rng.uniform(55.0, 75.0)
+    changes = {name: DRAWS[name](rng, base, length) for name in effects}
+    count = round((RUN_IN + length + CONTINUATION) / recorder.period) * recorder.period
+    u = commands(rng, count, recorder.period, (low, high), 2 * base.f_d1 + base.f_s + base.f_d)
+    return Plan(base, changes, u, length, step)
+
+
+def run(plan: Plan, physics: Physics, recorder: Recorder, times: np.ndarray) -> Trace:
+    """Simulate the plan from the run-in to the end of the continuation."""
+    command_times = recorder.period * np.arange(plan.u.size)
+    return simulate(plan.u, command_times, times, physics, step=plan.step, origin=RUN_IN)
+
+
+def plausible(trace: Trace) -> bool:
+    """Tell whether the stem stays within its stroke and moves."""
+    whole = np.isfinite(trace.x).all() and -4.0 < trace.stem.min() and trace.stem.max() < 104.0
+    return bool(whole and np.ptp(trace.stem) > 10.0)
+
+
+def draw(
+    rng: Rng,
+    effects: tuple[str, ...],
+    signals: tuple[str, ...],
+    nuisances: float,
+    steps: tuple[float, ...] = (2e-3,),
+) -> Blind:
+    """Draw records until the stem stays within its stroke and every effect can be seen.
+
+    Parameters
+    ----------
+    rng : Generator
+        Source of all choices.
+    effects : tuple of str
+        Their ids; none for a clean record.
+    signals : tuple of str
+        What is measured.
+    nuisances : float
+        Probability of each nuisance of the recorder.
+    steps : tuple of float
+        Steps of the integrator to choose from [s].
+    """
+    for _ in range(TRIES):
+        recorder = draw_recorder(rng, nuisances)
+        plan = draw_plan(rng, effects, recorder, float(rng.choice(steps)))
+        times = sample_times(recorder, plan.u.size, rng)
+        trace = run(plan, plan.valve(), recorder, times)
+        if not plausible(trace):
+            continue
+        seen = {}
+        for name in effects:
+            other = run(plan, plan.valve(without=name), recorder, times)
+            seen[name] = visible(trace, other, recorder.noise, signals)
+        if all(max(each.values()) >= WANTED for each in seen.values()):
+            return Blind(plan, recorder, times, trace, seen)
+    raise ValueError(f'no visible record with {effects} on {signals} in {TRIES} tries')
+
+
+def write(blind: Blind, rng: Rng, name: str, signals: tuple[str, ...], folder: Path) -> None:
+    """Write the record to records/, its key and its continuation to keys/."""
+    recorder, plan = blind.recorder, blind.plan
+    period = recorder.period
+    first = round(RUN_IN / period)
+    last = first + round(plan.length / period)
+    found = measured(blind.trace, recorder, signals, rng)
+    # the last command that had arrived when the sample was taken
+    arrived = np.clip(np.floor(blind.times / period + 1e-9).astype(int), 0, plan.u.size - 1)
+    stamps = blind.times - first * period
+    jitter = np.clip(rng.standard_normal(stamps.size), -3, 3) * recorder.stamp_jitter * period
+    nominal = period * (np.arange(stamps.size) - first)
+    stamps = np.round(stamps + jitter, 4) if rng.random() < 0.3 else nominal
+    columns = {'u': plan.u[arrived], **found}
+    part = slice(first, last)
+    (folder / 'records').mkdir(parents=True, exist_ok=True)
+    (folder / 'keys').mkdir(parents=True, exist_ok=True)
+    if recorder.bag:
+        write_bag(
+            folder / 'records' / name,
+            nominal[part] + 1e-4,
+            plan.u[part],
+            (blind.times - first * period + 2e-4 + np.abs(jitter))[part],
+            {signal: values[part] for signal, values in found.items()},
+        )
+    else:
+        in_part = {signal: values[part] for signal, values in columns.items()}
+        write_csv(folder / 'records' / f'{name}.csv', stamps[part], in_part)
+    after = {signal: values[last:] for signal, values in columns.items()}
+    write_csv(folder / 'keys' / f'{name}.next.csv', nominal[last:], after)
+    key = {
+        'effects': list(plan.changes),
+        'parameters': plan.changes,
+        'base': {k: v for k, v in plan.base._asdict().items() if k in Physics._fields[:8]},
+        'signals': list(signals),
+        'change_in_noise': blind.visibility,
+        'recorder': asdict(recorder),
+        'step': plan.step,
+        'length': plan.length,
+    }
+    aside = folder / 'keys' / f'.{name}.part'
+    aside.write_text(json.dumps(key, indent=1) + '\n', encoding='utf-8')
+    os.replace(aside, folder / 'keys' / f'{name}.json')
