@@ -83,7 +83,7 @@ def small_reversals(w: Writer) -> None:
     """Reverse around one level by growing amounts."""
     centre = w.rng.uniform(w.low + 10, w.high - 10)
     w.hold(centre, 15)
-    for growth in np.linspace(0.5, 2.5, w.rng.integers(5, 9)):
+    for growth in np.linspace(0.3, 1.5, w.rng.integers(5, 9)):
         w.hold(centre + growth * w.band, w.rng.uniform(4, 12))
         w.hold(centre - growth * w.band, w.rng.uniform(4, 12))
 

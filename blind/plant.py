@@ -37,8 +37,8 @@ def _run(commands, command_steps, sample_steps, q, h, origin):
     s[at.PLAY :] = commands[0]
     steps = sample_steps[-1] + 1
     inlet_history = np.empty(steps)
-    ip_delay = int(round(q.ip_delay / h))
-    tube_delay = int(round(q.tube_delay / h))
+    ip_delay = round(q.ip_delay / h)
+    tube_delay = round(q.tube_delay / h)
     samples = np.empty((4, sample_steps.size))
     c, k = 0, 0
     for i in range(steps):

@@ -92,7 +92,7 @@ def run(plan: Plan, physics: Physics, recorder: Recorder, times: np.ndarray) -> 
 
 def plausible(trace: Trace) -> bool:
     """Tell whether the stem stays within its stroke and moves."""
-    whole = np.isfinite(trace.x).all() and -4.0 < trace.stem.min() and trace.stem.max() < 104.0
+    whole = np.isfinite(trace.x).all() and trace.stem.min() > -4.0 and trace.stem.max() < 104.0
     return bool(whole and np.ptp(trace.stem) > 10.0)
 
 
@@ -134,6 +134,13 @@ def draw(
     raise ValueError(f'no visible record with {effects} on {signals} in {TRIES} tries')
 
 
+def arrived(blind: Blind) -> np.ndarray:
+    """Return the index of the last command that had arrived when each sample was taken."""
+    step, count = blind.plan.step, blind.plan.u.size
+    command_steps = np.rint(blind.recorder.period * np.arange(count) / step)
+    return np.searchsorted(command_steps, np.rint(blind.times / step), side='right') - 1
+
+
 def write(blind: Blind, rng: Rng, name: str, signals: tuple[str, ...], folder: Path) -> None:
     """Write the record to records/, its key and its continuation to keys/."""
     recorder, plan = blind.recorder, blind.plan
@@ -141,13 +148,11 @@ def write(blind: Blind, rng: Rng, name: str, signals: tuple[str, ...], folder: P
     first = round(RUN_IN / period)
     last = first + round(plan.length / period)
     found = measured(blind.trace, recorder, signals, rng)
-    # the last command that had arrived when the sample was taken
-    arrived = np.clip(np.floor(blind.times / period + 1e-9).astype(int), 0, plan.u.size - 1)
+    columns = {'u': plan.u[arrived(blind)], **found}
     stamps = blind.times - first * period
     jitter = np.clip(rng.standard_normal(stamps.size), -3, 3) * recorder.stamp_jitter * period
     nominal = period * (np.arange(stamps.size) - first)
     stamps = np.round(stamps + jitter, 4) if rng.random() < 0.3 else nominal
-    columns = {'u': plan.u[arrived], **found}
     part = slice(first, last)
     (folder / 'records').mkdir(parents=True, exist_ok=True)
     (folder / 'keys').mkdir(parents=True, exist_ok=True)

@@ -15,8 +15,8 @@ import numpy as np
 
 from . import records
 from .effects import EFFECTS
-from .plant import simulate
 from .physics import Physics
+from .plant import simulate
 from .unknown import UNKNOWN
 
 SPLITS = ('tuning', 'test')
