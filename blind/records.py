@@ -14,9 +14,10 @@ from .excitations import commands
 from .physics import Physics
 from .plant import simulate, Trace
 from .recorder import draw_recorder, measured, Recorder, sample_times, write_bag, write_csv
+from .refit import left_over
 from .unknown import UNKNOWN
 from .valves import base_valve
-from .visibility import visible, WANTED
+from .visibility import LEFT, visible, WANTED
 
 Rng = np.random.Generator
 RUN_IN = 80.0
@@ -69,6 +70,7 @@ class Blind:
     times: np.ndarray
     trace: Trace
     visibility: dict[str, dict[str, float]]
+    unexplained: dict[str, dict[str, float]]
 
 
 def draw_plan(rng: Rng, effects: tuple[str, ...], recorder: Recorder, step: float) -> Plan:
@@ -90,10 +92,35 @@ def run(plan: Plan, physics: Physics, recorder: Recorder, times: np.ndarray) -> 
     return simulate(plan.u, command_times, times, physics, step=plan.step, origin=RUN_IN)
 
 
+def record_part(plan: Plan, recorder: Recorder) -> slice:
+    """Return which samples make up the record."""
+    first = round(RUN_IN / recorder.period)
+    return slice(first, first + round(plan.length / recorder.period))
+
+
 def plausible(trace: Trace) -> bool:
     """Tell whether the stem stays within its stroke and moves."""
     whole = np.isfinite(trace.x).all() and trace.stem.min() > -4.0 and trace.stem.max() < 104.0
     return bool(whole and np.ptp(trace.stem) > 10.0)
+
+
+def _beyond_refit(
+    plan: Plan, recorder: Recorder, recorded: list[Trace], signals: tuple[str, ...]
+) -> dict[str, float]:
+    """Return what a refit leaves of an effect in each signal [multiples of its noise]."""
+    left = [
+        left_over(
+            trace,
+            plan.u[record_part(plan, recorder)],
+            plan.base,
+            recorder.noise,
+            signals,
+            recorder.period,
+            recorder.phase,
+        )
+        for trace in recorded
+    ]
+    return {name: max(left[0][name] ** 2 - left[1][name] ** 2, 0.0) ** 0.5 for name in signals}
 
 
 def draw(
@@ -125,12 +152,20 @@ def draw(
         trace = run(plan, plan.valve(), recorder, times)
         if not plausible(trace):
             continue
-        seen = {}
+        seen: dict[str, dict[str, float]] = {}
+        unexplained: dict[str, dict[str, float]] = {}
         for name in effects:
+            part = record_part(plan, recorder)
             other = run(plan, plan.valve(without=name), recorder, times)
-            seen[name] = visible(trace, other, recorder.noise, signals)
-        if all(max(each.values()) >= WANTED for each in seen.values()):
-            return Blind(plan, recorder, times, trace, seen)
+            recorded = [Trace(*(row[part] for row in each)) for each in (trace, other)]
+            seen[name] = visible(*recorded, recorder.noise, signals)
+            if max(seen[name].values()) < WANTED:
+                break
+            unexplained[name] = _beyond_refit(plan, recorder, recorded, signals)
+            if max(unexplained[name].values()) < LEFT:
+                break
+        else:
+            return Blind(plan, recorder, times, trace, seen, unexplained)
     raise ValueError(f'no visible record with {effects} on {signals} in {TRIES} tries')
 
 
@@ -145,15 +180,14 @@ def write(blind: Blind, rng: Rng, name: str, signals: tuple[str, ...], folder: P
     """Write the record to records/, its key and its continuation to keys/."""
     recorder, plan = blind.recorder, blind.plan
     period = recorder.period
-    first = round(RUN_IN / period)
-    last = first + round(plan.length / period)
+    part = record_part(plan, recorder)
+    first, last = part.start, part.stop
     found = measured(blind.trace, recorder, signals, rng)
     columns = {'u': plan.u[arrived(blind)], **found}
     stamps = blind.times - first * period
     jitter = np.clip(rng.standard_normal(stamps.size), -3, 3) * recorder.stamp_jitter * period
     nominal = period * (np.arange(stamps.size) - first)
     stamps = np.round(stamps + jitter, 4) if rng.random() < 0.3 else nominal
-    part = slice(first, last)
     (folder / 'records').mkdir(parents=True, exist_ok=True)
     (folder / 'keys').mkdir(parents=True, exist_ok=True)
     if recorder.bag:
@@ -175,6 +209,7 @@ def write(blind: Blind, rng: Rng, name: str, signals: tuple[str, ...], folder: P
         'base': {k: v for k, v in plan.base._asdict().items() if k in Physics._fields[:8]},
         'signals': list(signals),
         'change_in_noise': blind.visibility,
+        'unexplained_in_noise': blind.unexplained,
         'recorder': asdict(recorder),
         'step': plan.step,
         'length': plan.length,

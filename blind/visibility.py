@@ -8,19 +8,25 @@ from .plant import Trace
 
 WANTED = 3.0
 """Least change of some measured signal [multiples of its noise]."""
+LEFT = 1.5
+"""Least part of it that no other valve without the effect can imitate [multiples of noise]."""
 SHARE = 0.05
 """Share of the record over which the change is averaged: where it is largest."""
+
+
+def largest(values: np.ndarray) -> float:
+    """Return the root mean square of the values where they are largest."""
+    ordered = np.sort(np.abs(values))[-max(int(SHARE * values.size), 20) :]
+    return float(np.sqrt(np.mean(ordered**2)))
 
 
 def change(with_effect: np.ndarray, without: np.ndarray) -> float:
     """Return the root mean square change where it is largest, at the most lenient shift [%]."""
     index = np.arange(without.size, dtype=float)
-    found = np.inf
-    for shift in (-1.0, -0.5, 0.0, 0.5, 1.0):
-        difference = np.sort(np.abs(with_effect - np.interp(index + shift, index, without)))
-        largest = difference[-max(int(SHARE * difference.size), 20) :]
-        found = min(found, float(np.sqrt(np.mean(largest**2))))
-    return found
+    return min(
+        largest(with_effect - np.interp(index + shift, index, without))
+        for shift in (-1.0, -0.5, 0.0, 0.5, 1.0)
+    )
 
 
 def visible(
