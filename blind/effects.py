@@ -27,9 +27,20 @@ def ip_lag(rng: Rng, valve: Physics, length: float) -> Changes:
     return {'ip_tau': log_uniform(rng, 0.05, 4.0)}
 
 
+def off_line(rng: Rng, device: str, zero: float, span: float) -> Changes:
+    """Shift or stretch a device's line by up to this much, or both."""
+    changes = {
+        f'{device}_zero': either_sign(rng, 0.5, zero),
+        f'{device}_span': 1.0 + either_sign(rng, 0.01, span),
+    }
+    if rng.random() < 0.5:
+        del changes[f'{device}_{rng.choice(("zero", "span"))}']
+    return changes
+
+
 def ip_calibration(rng: Rng, valve: Physics, length: float) -> Changes:
-    """Shift and stretch the transducer's line."""
-    return {'ip_zero': either_sign(rng, 0.5, 5.0), 'ip_span': 1.0 + either_sign(rng, 0.01, 0.12)}
+    """Shift or stretch the transducer's line, or both."""
+    return off_line(rng, 'ip', 5.0, 0.12)
 
 
 def ip_nonlinearity(rng: Rng, valve: Physics, length: float) -> Changes:
@@ -156,8 +167,11 @@ def friction_drift(rng: Rng, valve: Physics, length: float) -> Changes:
 
 
 def spring_preload(rng: Rng, valve: Physics, length: float) -> Changes:
-    """Press the stem on its seat."""
-    return {'preload': rng.uniform(2.0, 15.0), 'stop_low': 0.0}
+    """Preload the spring; most have the seat that gives a dead zone at the closed end."""
+    changes = {'preload': rng.uniform(2.0, 15.0)}
+    if rng.random() < 0.6:
+        changes['stop_low'] = 0.0
+    return changes
 
 
 def spring_rate(rng: Rng, valve: Physics, length: float) -> Changes:
@@ -213,11 +227,8 @@ def sensor_lag(rng: Rng, valve: Physics, length: float) -> Changes:
 
 
 def sensor_calibration(rng: Rng, valve: Physics, length: float) -> Changes:
-    """Shift and stretch the sensor's line."""
-    return {
-        'sensor_zero': either_sign(rng, 0.5, 5.0),
-        'sensor_span': 1.0 + either_sign(rng, 0.01, 0.15),
-    }
+    """Shift or stretch the sensor's line, or both."""
+    return off_line(rng, 'sensor', 5.0, 0.15)
 
 
 def sensor_quantisation(rng: Rng, valve: Physics, length: float) -> Changes:

@@ -5,6 +5,7 @@
 from collections.abc import Callable
 
 import numpy as np
+from scipy.signal import lfilter
 
 Array = np.ndarray
 
@@ -109,21 +110,49 @@ def rest_and_nudge(w: Writer) -> None:
             w.hold(w.level + sign * way * w.rng.uniform(1.2, 2.5) * w.band, w.rng.uniform(5, 15))
 
 
-PIECES: tuple[Callable[[Writer], None], ...] = (
+def closed_loop(w: Writer) -> None:
+    """Move as a controller does: swing towards changing levels, and never quite rest."""
+    holds = [
+        np.full(int(w.rng.uniform(30, 90) / w.period), 1.0) for _ in range(w.rng.integers(2, 5))
+    ]
+    wanted = np.concatenate([hold * w.rng.uniform(w.low, w.high) for hold in holds])
+    swing = 2 * np.pi * w.period / w.rng.uniform(15, 60)
+    poles = np.exp(swing * (-w.rng.uniform(0.3, 0.8) + 1j))
+    filtered = lfilter(
+        [abs(1 - poles) ** 2], [1, -2 * poles.real, abs(poles) ** 2], wanted - w.level
+    )
+    keep = np.exp(-w.period / 3.0)
+    wander = lfilter([np.sqrt(1 - keep**2)], [1, -keep], w.rng.standard_normal(wanted.size))
+    u = w.level + filtered + w.rng.uniform(0.05, 0.5) * wander
+    w.pieces.append(np.clip(u, w.low - 2, w.high + 2))
+    w.level = float(np.clip(u[-1], w.low, w.high))
+
+
+WIDE: tuple[Callable[[Writer], None], ...] = (
     staircase,
     big_steps,
     ramps,
     random_stairs,
-    small_reversals,
     sine,
-    rest_and_nudge,
+    closed_loop,
 )
+NARROW = (small_reversals, rest_and_nudge)
+
+
+def choose_pieces(rng: np.random.Generator) -> list[Callable[[Writer], None]]:
+    """Return all kinds of pieces, or one to three of which one at least is wide."""
+    if rng.random() < 0.5:
+        return [*WIDE, *NARROW]
+    first = int(rng.integers(len(WIDE)))
+    others = [*WIDE[:first], *WIDE[first + 1 :], *NARROW]
+    more = rng.choice(len(others), rng.integers(0, 3), replace=False)
+    return [WIDE[first], *(others[k] for k in more)]
 
 
 def commands(
     rng: np.random.Generator, seconds: float, period: float, span: tuple[float, float], band: float
 ) -> Array:
-    """Return a rich record of commands.
+    """Return a record of commands: of every kind, or of a few.
 
     Parameters
     ----------
@@ -143,7 +172,8 @@ def commands(
     """
     writer = Writer(rng, period, *span, band)
     wanted = round(seconds / period)
+    pieces = choose_pieces(rng)
     while writer.length < wanted:
-        for k in rng.permutation(len(PIECES)):
-            PIECES[k](writer)
+        for k in rng.permutation(len(pieces)):
+            pieces[k](writer)
     return np.clip(np.concatenate(writer.pieces)[:wanted], 0.0, 100.0)

@@ -14,6 +14,7 @@ from .physics import Physics
 from .sensor import sense
 from .stem import stem
 
+CONSTANTS = np.dtype([(name, np.float64) for name in Physics._fields])
 STEP = 1e-3
 """Step of the integrator [s]."""
 
@@ -82,7 +83,7 @@ def simulate(
     origin : float
         Time at which drifts begin and periodic effects have phase zero [s].
     """
-    constants = Physics(*map(float, physics))
+    constants = np.array([tuple(physics)], dtype=CONSTANTS)[0]
     samples = _run(
         np.ascontiguousarray(commands, dtype=np.float64),
         np.rint(command_times / step).astype(np.int64),

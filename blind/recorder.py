@@ -64,7 +64,7 @@ def draw_recorder(rng: Rng, share: float) -> Recorder:
         return float(value) if there else 0.0
 
     signals = ('p1', 'p2', 'x')
-    bag = rng.random() < 0.3
+    bag = rng.random() < 0.15
     return Recorder(
         period=float(rng.choice((0.2, 0.1, 0.5), p=(0.8, 0.1, 0.1))),
         phase=sometimes(0.02, 0.98),

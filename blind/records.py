@@ -12,7 +12,7 @@ import numpy as np
 from .effects import Changes, EFFECTS
 from .excitations import commands
 from .physics import Physics
-from .plant import simulate, Trace
+from .plant import simulate, STEP, Trace
 from .recorder import draw_recorder, measured, Recorder, sample_times, write_bag, write_csv
 from .refit import left_over
 from .unknown import UNKNOWN
@@ -76,7 +76,7 @@ class Blind:
 def draw_plan(rng: Rng, effects: tuple[str, ...], recorder: Recorder, step: float) -> Plan:
     """Draw a valve, sizes of its effects and commands."""
     base = base_valve(rng)
-    length = float(rng.integers(600, 901))
+    length = float(round(rng.triangular(600, 900, 1500)))
     low, high = (rng.uniform(2.0, 20.0), rng.uniform(75.0, 98.0))
     if rng.random() < 0.2:
         low, high = rng.uniform(10.0, 30.0), rng.uniform(55.0, 75.0)
@@ -128,7 +128,7 @@ def draw(
     effects: tuple[str, ...],
     signals: tuple[str, ...],
     nuisances: float,
-    steps: tuple[float, ...] = (2e-3,),
+    steps: tuple[float, ...] = (STEP,),
 ) -> Blind:
     """Draw records until the stem stays within its stroke and every effect can be seen.
 
@@ -148,6 +148,9 @@ def draw(
     for _ in range(TRIES):
         recorder = draw_recorder(rng, nuisances)
         plan = draw_plan(rng, effects, recorder, float(rng.choice(steps)))
+        if 'sensor_quantisation' in effects and rng.random() < 0.5:
+            # half of the sensors round the noise too
+            recorder.resolution['x'] = plan.changes['sensor_quantisation']['sensor_step']
         times = sample_times(recorder, plan.u.size, rng)
         trace = run(plan, plan.valve(), recorder, times)
         if not plausible(trace):

@@ -16,10 +16,10 @@ from .physics import Physics
 from .plant import Trace
 from .visibility import largest
 
-EVALUATIONS = 350
+EVALUATIONS = 250
 
 
-@numba.njit()
+@numba.njit
 def _rough(u, p1, p2, have_p1, have_p2, theta, period, phase):
     """Return p1, p2 and x of the rough valve at the samples, shape (3, n)."""
     f_d1, T_g1, T_g2, f_s, f_d, rate = theta

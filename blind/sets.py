@@ -49,7 +49,7 @@ SETS: dict[str, tuple[Callable[[int, Rng, Rng], tuple[str, ...]], int, float]] =
     'unknown': (_unknown, len(UNKNOWN), 0.3),
     'pairs': (_pairs, 1, 0.3),
 }
-FINER = (2e-3, 1e-3, 5e-4)
+STEPS = (2e-3, 1e-3, 5e-4)
 
 
 def generate_one(
@@ -57,13 +57,13 @@ def generate_one(
 ) -> str:
     """Write record `index` of a set; return its name."""
     choose, block, nuisances = SETS[name]
-    root = [zlib.crc32(f'{name} {split}'.encode()), seed]
+    root = [zlib.crc32(' '.join((name, split, *signals)).encode()), seed]
     for attempt in range(20):
         rng = np.random.default_rng([*root, 1, index, attempt])
         effects = choose(index, np.random.default_rng([*root, 0, index // block]), rng)
         try:
             blind = records.draw(
-                rng, effects, signals, nuisances, FINER if name == 'clean' else FINER[:1]
+                rng, effects, signals, nuisances, STEPS if name == 'clean' else STEPS[1:2]
             )
         except ValueError:
             if name == 'pairs':
