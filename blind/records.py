@@ -3,8 +3,6 @@
 """One blind record: a random valve, its hidden effects, its commands, its recorder, its key."""
 
 from dataclasses import asdict, dataclass
-import json
-import os
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +13,7 @@ from .physics import Physics
 from .plant import simulate, STEP, Trace
 from .recorder import draw_recorder, measured, Recorder, sample_times, write_bag, write_csv
 from .refit import left_over
+from .seal import write_json
 from .unknown import UNKNOWN
 from .valves import base_valve
 from .visibility import LEFT, visible, WANTED
@@ -159,7 +158,7 @@ def draw(
         unexplained: dict[str, dict[str, float]] = {}
         for name in effects:
             part = record_part(plan, recorder)
-            other = run(plan, plan.valve(without=name), recorder, times)
+            other = run(plan, plan.valve(without=name), recorder, times[: part.stop])
             recorded = [Trace(*(row[part] for row in each)) for each in (trace, other)]
             seen[name] = visible(*recorded, recorder.noise, signals)
             if max(seen[name].values()) < WANTED:
@@ -204,7 +203,9 @@ def write(blind: Blind, rng: Rng, name: str, signals: tuple[str, ...], folder: P
     else:
         in_part = {signal: values[part] for signal, values in columns.items()}
         write_csv(folder / 'records' / f'{name}.csv', stamps[part], in_part)
-    after = {signal: values[last:] for signal, values in columns.items()}
+    # what nobody measures: the signals that follow, without noise
+    after = {'u': columns['u'][last:]}
+    after |= {signal: getattr(blind.trace, signal)[last:] for signal in signals}
     write_csv(folder / 'keys' / f'{name}.next.csv', nominal[last:], after)
     key = {
         'effects': list(plan.changes),
@@ -217,6 +218,4 @@ def write(blind: Blind, rng: Rng, name: str, signals: tuple[str, ...], folder: P
         'step': plan.step,
         'length': plan.length,
     }
-    aside = folder / 'keys' / f'.{name}.part'
-    aside.write_text(json.dumps(key, indent=1) + '\n', encoding='utf-8')
-    os.replace(aside, folder / 'keys' / f'{name}.json')
+    write_json(folder / 'keys' / f'{name}.json', key)

@@ -5,9 +5,7 @@
 from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor
 from functools import partial
-import json
 from multiprocessing import get_context
-import os
 from pathlib import Path
 import zlib
 
@@ -17,6 +15,7 @@ from . import records
 from .effects import EFFECTS
 from .physics import Physics
 from .plant import simulate
+from .seal import digest, write_json
 from .unknown import UNKNOWN
 
 SPLITS = ('tuning', 'test')
@@ -45,6 +44,7 @@ def _clean(index: int, block: Rng, rng: Rng) -> tuple[str, ...]:
 SETS: dict[str, tuple[Callable[[int, Rng, Rng], tuple[str, ...]], int, float]] = {
     # how the effects are chosen, length of a block with each of them once, share of nuisances
     'singles': (_singles, len(EFFECTS), 0.3),
+    'left_out': (_singles, len(EFFECTS), 0.3),
     'clean': (_clean, 1, 0.6),
     'unknown': (_unknown, len(UNKNOWN), 0.3),
     'pairs': (_pairs, 1, 0.3),
@@ -100,12 +100,10 @@ def generate(
         Called with 1 after each record.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    about = {'set': name, 'split': split, 'signals': signals, 'count': count, 'seed': seed}
-    aside = folder / '.set.json.part'
-    aside.write_text(json.dumps(about, indent=1) + '\n', encoding='utf-8')
-    os.replace(aside, folder / 'set.json')
     simulate(np.zeros(2), np.arange(2.0), np.arange(2.0), Physics())  # compile before the fork
     work = partial(generate_one, name, split, signals, seed, folder)
     with ProcessPoolExecutor(WORKERS, mp_context=get_context('fork')) as pool:
         for _ in pool.map(work, range(count)):
             progress(1)
+    about = {'set': name, 'split': split, 'signals': signals, 'count': count, 'seed': seed}
+    write_json(folder / 'set.json', {**about, 'seal': digest(folder / 'keys')})
