@@ -27,20 +27,20 @@ def ip_lag(rng: Rng, valve: Physics, length: float) -> Changes:
     return {'ip_tau': log_uniform(rng, 0.05, 4.0)}
 
 
-def off_line(rng: Rng, device: str, zero: float, span: float) -> Changes:
-    """Shift or stretch a device's line by up to this much, or both."""
+def off_line(rng: Rng, device: str, zero: float, span: float, one: float) -> Changes:
+    """Shift and stretch a device's line by up to this much; only one with this probability."""
     changes = {
         f'{device}_zero': either_sign(rng, 0.5, zero),
         f'{device}_span': 1.0 + either_sign(rng, 0.01, span),
     }
-    if rng.random() < 0.5:
+    if rng.random() < one:
         del changes[f'{device}_{rng.choice(("zero", "span"))}']
     return changes
 
 
 def ip_calibration(rng: Rng, valve: Physics, length: float) -> Changes:
     """Shift or stretch the transducer's line, or both."""
-    return off_line(rng, 'ip', 5.0, 0.12)
+    return off_line(rng, 'ip', 5.0, 0.12, one=0.5)
 
 
 def ip_nonlinearity(rng: Rng, valve: Physics, length: float) -> Changes:
@@ -227,8 +227,8 @@ def sensor_lag(rng: Rng, valve: Physics, length: float) -> Changes:
 
 
 def sensor_calibration(rng: Rng, valve: Physics, length: float) -> Changes:
-    """Shift or stretch the sensor's line, or both."""
-    return off_line(rng, 'sensor', 5.0, 0.15)
+    """Shift and stretch the sensor's line; a shift alone looks like preload, if no stop is met."""
+    return off_line(rng, 'sensor', 5.0, 0.15, one=0.15)
 
 
 def sensor_quantisation(rng: Rng, valve: Physics, length: float) -> Changes:

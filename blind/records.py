@@ -16,7 +16,7 @@ from .refit import left_over
 from .seal import write_json
 from .unknown import UNKNOWN
 from .valves import base_valve
-from .visibility import LEFT, visible, WANTED
+from .visibility import LEFT, ROUNDED_NOISE, STEPS, visible, WANTED
 
 Rng = np.random.Generator
 RUN_IN = 80.0
@@ -103,6 +103,13 @@ def plausible(trace: Trace) -> bool:
     return bool(whole and np.ptp(trace.stem) > 10.0)
 
 
+def steps_show(plan: Plan, recorder: Recorder) -> bool:
+    """Tell whether the steps of a coarse sensor are no finer than the noise allows to see."""
+    step = plan.changes['sensor_quantisation']['sensor_step']
+    least = ROUNDED_NOISE if recorder.resolution['x'] == step else STEPS
+    return step > least * recorder.noise['x']
+
+
 def _beyond_refit(
     plan: Plan, recorder: Recorder, recorded: list[Trace], signals: tuple[str, ...]
 ) -> dict[str, float]:
@@ -161,6 +168,8 @@ def draw(
             other = run(plan, plan.valve(without=name), recorder, times[: part.stop])
             recorded = [Trace(*(row[part] for row in each)) for each in (trace, other)]
             seen[name] = visible(*recorded, recorder.noise, signals)
+            if name == 'sensor_quantisation' and steps_show(plan, recorder):
+                continue
             if max(seen[name].values()) < WANTED:
                 break
             unexplained[name] = _beyond_refit(plan, recorder, recorded, signals)

@@ -31,7 +31,8 @@ def verdict(path: Path, out: Path, seed: int, without: tuple[str, ...]) -> None:
     from valve_sim_ros.diagnosis import diagnose
 
     out.mkdir(parents=True, exist_ok=True)
-    (out / 'error.txt').unlink(missing_ok=True)
+    for name in ('error.txt', 'seconds.json'):
+        (out / name).unlink(missing_ok=True)
     began = time.perf_counter()
     try:
         diagnose([path], seed=seed, without=without).write(out, report=False)
@@ -41,7 +42,8 @@ def verdict(path: Path, out: Path, seed: int, without: tuple[str, ...]) -> None:
         write_json(out / 'seconds.json', time.perf_counter() - began)
 
 
-def _one(folder: Path, out: Path, seed: int, path: Path) -> None:
+def one(folder: Path, out: Path, seed: int, path: Path) -> None:
+    """Diagnose one record of a set; without its effects if they are to be left out."""
     left_out = read_json(folder / 'set.json')['set'] == LEFT_OUT
     without = hidden(folder, path.stem) if left_out else ()
     verdict(path, out / path.stem, seed, without)
@@ -80,6 +82,6 @@ def run(
     missing = [path for path in paths if not (out / path.stem / 'seconds.json').exists()]
     progress(len(paths) - len(missing))
     with ProcessPoolExecutor(workers, mp_context=get_context('spawn')) as pool:
-        for _ in pool.map(partial(_one, folder, out, seed), missing):
+        for _ in pool.map(partial(one, folder, out, seed), missing):
             progress(1)
     return sum((out / path.stem / 'error.txt').exists() for path in paths)

@@ -14,13 +14,22 @@ import numpy as np
 from . import records
 from .effects import EFFECTS
 from .physics import Physics
-from .plant import simulate
+from .plant import simulate, STEP
 from .seal import digest, write_json
 from .unknown import UNKNOWN
 
 SPLITS = ('tuning', 'test')
-WORKERS = 2
 Rng = np.random.Generator
+
+
+ALIASES: tuple[set[str], ...] = (
+    # one of the two undoes the other, or a single effect does exactly the same
+    {'sensor_calibration', 'spring_preload'},
+    {'sensor_calibration', 'spring_rate'},
+    {'spring_preload', 'spring_rate'},
+    # both place the lower stop
+    {'spring_preload', 'travel_stops'},
+)
 
 
 def _singles(index: int, block: Rng, rng: Rng) -> tuple[str, ...]:
@@ -34,7 +43,10 @@ def _unknown(index: int, block: Rng, rng: Rng) -> tuple[str, ...]:
 
 
 def _pairs(index: int, block: Rng, rng: Rng) -> tuple[str, ...]:
-    return tuple(str(name) for name in rng.choice(list(EFFECTS), 2, replace=False))
+    while True:
+        pair = tuple(str(name) for name in rng.choice(list(EFFECTS), 2, replace=False))
+        if set(pair) not in ALIASES:
+            return pair
 
 
 def _clean(index: int, block: Rng, rng: Rng) -> tuple[str, ...]:
@@ -49,7 +61,8 @@ SETS: dict[str, tuple[Callable[[int, Rng, Rng], tuple[str, ...]], int, float]] =
     'unknown': (_unknown, len(UNKNOWN), 0.3),
     'pairs': (_pairs, 1, 0.3),
 }
-STEPS = (2e-3, 1e-3, 5e-4)
+WORKERS = 2
+CLEAN_STEPS = (5e-3, 2e-3, 1e-3, 5e-4)
 
 
 def generate_one(
@@ -62,9 +75,8 @@ def generate_one(
         rng = np.random.default_rng([*root, 1, index, attempt])
         effects = choose(index, np.random.default_rng([*root, 0, index // block]), rng)
         try:
-            blind = records.draw(
-                rng, effects, signals, nuisances, STEPS if name == 'clean' else STEPS[1:2]
-            )
+            steps = (STEP,) if effects else CLEAN_STEPS
+            blind = records.draw(rng, effects, signals, nuisances, steps)
         except ValueError:
             if name == 'pairs':
                 continue

@@ -10,6 +10,8 @@ WANTED = 3.0
 """Least change of some measured signal [multiples of its noise]."""
 LEFT = 1.5
 """Least part of it that no other valve without the effect can imitate [multiples of noise]."""
+STEPS, ROUNDED_NOISE = 4.0, 1.5
+"""Least steps of a coarse sensor [multiples of noise]: noise on top, or rounded with it."""
 SHARE = 0.05
 """Share of the record over which the change is averaged: where it is largest."""
 
