@@ -40,6 +40,9 @@ class Recorder:
         Single wild values.
     loss : float
         Share of lost values.
+    as_sent : bool
+        Whether the column u holds the commands as they were sent, one for each row, instead of
+        the last one that had arrived when the row's signals were sampled.
     bag : bool
         Whether it is written as a bag instead of a CSV file.
     """
@@ -53,6 +56,7 @@ class Recorder:
     resolution: dict[str, float] = field(default_factory=dict)
     outliers: int = 0
     loss: float = 0.0
+    as_sent: bool = False
     bag: bool = False
 
 
@@ -77,6 +81,7 @@ def draw_recorder(rng: Rng, share: float) -> Recorder:
         else dict.fromkeys(signals, 0.0),
         outliers=int(rng.integers(1, 5)) if rng.random() < 0.5 * share else 0,
         loss=0.02 if rng.random() < share else 0.0,
+        as_sent=bool(rng.random() < 0.5),
         bag=bag,
     )
 

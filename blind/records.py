@@ -180,9 +180,11 @@ def draw(
     raise ValueError(f'no visible record with {effects} on {signals} in {TRIES} tries')
 
 
-def arrived(blind: Blind) -> np.ndarray:
-    """Return the index of the last command that had arrived when each sample was taken."""
+def command_beside(blind: Blind) -> np.ndarray:
+    """Return the index of the command that is written beside each sample."""
     step, count = blind.plan.step, blind.plan.u.size
+    if blind.recorder.as_sent:
+        return np.arange(count)
     command_steps = np.rint(blind.recorder.period * np.arange(count) / step)
     return np.searchsorted(command_steps, np.rint(blind.times / step), side='right') - 1
 
@@ -194,7 +196,7 @@ def write(blind: Blind, rng: Rng, name: str, signals: tuple[str, ...], folder: P
     part = record_part(plan, recorder)
     first, last = part.start, part.stop
     found = measured(blind.trace, recorder, signals, rng)
-    columns = {'u': plan.u[arrived(blind)], **found}
+    columns = {'u': plan.u[command_beside(blind)], **found}
     stamps = blind.times - first * period
     jitter = np.clip(rng.standard_normal(stamps.size), -3, 3) * recorder.stamp_jitter * period
     nominal = period * (np.arange(stamps.size) - first)
