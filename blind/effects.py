@@ -106,12 +106,11 @@ def quick_exhaust(rng: Rng, valve: Physics, length: float) -> Changes:
 
 
 def rate_limit(rng: Rng, valve: Physics, length: float) -> Changes:
-    """Limit the speed of p2 or of the stem, both ways or one."""
-    rates = [log_uniform(rng, 1.0, 30.0)] * 2
-    if rng.random() < 0.4:
-        rates[rng.integers(2)] *= rng.uniform(1.5, 3.0)
-    names = ('p2_rate_up', 'p2_rate_down') if rng.random() < 0.6 else ('v_up', 'v_down')
-    return dict(zip(names, rates, strict=True))
+    """Limit the speed of p2, or of the stem by direction."""
+    rate = log_uniform(rng, 1.0, 30.0)
+    if rng.random() < 0.6:
+        return {'p2_rate_up': rate, 'p2_rate_down': rate}
+    return {'v_up': rate, 'v_down': rate * log_uniform(rng, 0.4, 2.5)}
 
 
 def hysteresis(rng: Rng, valve: Physics, length: float) -> Changes:

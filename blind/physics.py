@@ -99,7 +99,8 @@ class Physics(NamedTuple):
     warming_omega: float = 0.01
     kick: float = 0.0
     kick_interval: float = 20.0
-    band_of_p1: float = 0.0
+    swing: float = 0.0
+    swing_omega: float = 0.03
     thermal: float = 0.0
     thermal_time: float = 20.0
     area_wave: float = 0.0

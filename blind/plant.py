@@ -53,7 +53,7 @@ def _run(commands, command_steps, sample_steps, q, h, origin):
             samples[0, k], samples[1, k], samples[2, k] = p1, p2, s[at.XM]
             samples[3, k] = s[at.X]
             k += 1
-        stem(p1, p2, s, q, h, t)
+        stem(p2, s, q, h, t)
         chamber(inlet_history[max(i - tube_delay, 0)], s, q, h, t)
         sense(s, q, h, t)
     return samples

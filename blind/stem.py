@@ -43,13 +43,15 @@ def contact(x, q):
 
 
 @numba.njit
-def friction_scale(direction, p1, x, q, t):
+def friction_scale(direction, x, q, t):
     """Return the factor on both friction levels here and now."""
     scale = (1.0 + q.asymmetry * direction) * (1.0 + q.friction_drift * max(t, 0.0))
     scale *= 1.0 + q.friction_slope * 0.01 * min(max(x, 0.0), 100.0)
     if q.bump > 0.0:
         scale *= 1.0 + q.bump * exp(-(((x - q.bump_at) / q.bump_width) ** 2))
-    return max(scale * (1.0 + q.band_of_p1 * 0.02 * (p1 - 50.0)), 0.05)
+    if q.swing > 0.0:
+        scale *= 1.0 + q.swing * sin(q.swing_omega * t)
+    return max(scale, 0.05)
 
 
 @numba.njit
@@ -63,11 +65,11 @@ def breakaway(rest, q):
 
 
 @numba.njit
-def coulomb(force, p1, s, q, h, t):
+def coulomb(force, s, q, h, t):
     """Return the new speed of a stem with a breakaway force that drops at once."""
     v = s[at.V]
     direction = 1.0 if (force if v == 0.0 else v) > 0.0 else -1.0
-    scale = friction_scale(direction, p1, s[at.X], q, t)
+    scale = friction_scale(direction, s[at.X], q, t)
     if v == 0.0:
         s[at.REST] += h
         if abs(force) <= scale * breakaway(s[at.REST], q):
@@ -83,13 +85,13 @@ def coulomb(force, p1, s, q, h, t):
 
 
 @numba.njit
-def bristles(force, p1, s, q, h, t):
+def bristles(force, s, q, h, t):
     """Return the new speed of a stem held by elastic bristles (LuGre; Dahl without the drop)."""
     v, z = s[at.V], s[at.BRISTLE]
     level = q.f_d
     if q.dahl == 0.0:
         level += (q.f_s - q.f_d) * exp(-((v / q.bristle_stribeck) ** 2))
-    level *= friction_scale(1.0 if v > 0.0 else -1.0, p1, s[at.X], q, t)
+    level *= friction_scale(1.0 if v > 0.0 else -1.0, s[at.X], q, t)
     keep = 1.0 / (1.0 + h * q.bristle * abs(v) / level)
     elastic = q.bristle * keep * z + q.bristle_damping * (keep - 1.0) * z / h
     inertia = 1.0 + h * q.a_2 + h * q.a_1 * keep * (h * q.bristle + q.bristle_damping)
@@ -99,14 +101,14 @@ def bristles(force, p1, s, q, h, t):
 
 
 @numba.njit
-def stem(p1, p2, s, q, h, t):
+def stem(p2, s, q, h, t):
     """Advance the stem (the speed first, then the position with the new speed)."""
     x = s[at.X]
     force = push(p2, x, s, q, t) + contact(x, q)
     if q.bristle > 0.0:
-        v = bristles(force, p1, s, q, h, t)
+        v = bristles(force, s, q, h, t)
     else:
-        v = coulomb(force, p1, s, q, h, t)
+        v = coulomb(force, s, q, h, t)
     v = min(max(v, -q.v_down), q.v_up)
     x += h * v
     if q.stop_stiffness == 0.0:

@@ -8,7 +8,6 @@ import numpy as np
 
 from .effects import Changes, Rng
 from .physics import Physics
-from .valves import either_sign
 
 
 def spring_relaxation(rng: Rng, valve: Physics, length: float) -> Changes:
@@ -42,9 +41,9 @@ def stem_kicks(rng: Rng, valve: Physics, length: float) -> Changes:
     }
 
 
-def packing_pressure(rng: Rng, valve: Physics, length: float) -> Changes:
-    """Let the inlet pressure squeeze the packing."""
-    return {'band_of_p1': either_sign(rng, 0.5, 0.9)}
+def friction_swing(rng: Rng, valve: Physics, length: float) -> Changes:
+    """Let friction swing to and fro, as a packing does that warms up and cools down."""
+    return {'swing': rng.uniform(0.5, 0.9), 'swing_omega': 2 * np.pi / rng.uniform(120.0, 300.0)}
 
 
 def chamber_temperature(rng: Rng, valve: Physics, length: float) -> Changes:
@@ -75,7 +74,7 @@ UNKNOWN: dict[str, Callable[[Rng, Physics, float], Changes]] = {
         supply_ripple,
         warming_restriction,
         stem_kicks,
-        packing_pressure,
+        friction_swing,
         chamber_temperature,
         wrinkled_diaphragm,
         supply_dips,
