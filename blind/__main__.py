@@ -11,7 +11,7 @@ import click
 from tqdm import tqdm
 
 from . import runner, sets, study
-from .table import as_markdown, as_text
+from .table import as_markdown, as_text, one_by_one
 
 FOLDER = click.Path(path_type=Path)
 
@@ -62,12 +62,16 @@ def run(folder: Path, out: Path | None, seed: int, limit: int | None, workers: i
 @main.command()
 @click.argument('folder', type=FOLDER)
 @click.argument('verdicts', type=FOLDER, required=False)
-def score(folder: Path, verdicts: Path | None) -> None:
+@click.option('--records', is_flag=True, help='Also a line for each record.')
+def score(folder: Path, verdicts: Path | None, records: bool) -> None:
     """Open the keys of a set and score the verdicts."""
     try:
-        click.echo(as_text(study.scored(folder, verdicts or folder / 'verdicts')))
+        scored = study.scored(folder, verdicts or folder / 'verdicts')
     except ValueError as error:
         raise click.ClickException(str(error)) from None
+    click.echo(as_text(scored))
+    if records:
+        click.echo(one_by_one(scored))
 
 
 @main.command('study')

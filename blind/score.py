@@ -59,6 +59,7 @@ def rates(kind: str, outcomes: Sequence[Outcome]) -> list[Rate]:
         found = [
             rate('called unknown', outcomes, said(UNKNOWN)),
             rate('misnamed', outcomes, said(MISSING)),
+            rate('misnamed, truth a stated twin', outcomes, lambda each: each.within_twins),
             rate('called adequate', outcomes, said(ADEQUATE)),
         ]
     else:

@@ -72,6 +72,8 @@ def calibration(sets: Sequence[Scored]) -> str:
         if scored.kind in ('singles', 'pairs', 'clean')
         for each in scored.outcomes
     )
+    if not found.effects:
+        return 'no effect named'
     return (
         f'{100 * found.error:.1f} % over {found.effects} effects named (on average '
         f'{100 * found.mean_stated:.1f} % stated, {100 * found.share_right:.1f} % right)'
@@ -83,10 +85,36 @@ def share(rate: Rate) -> str:
     return f'{rate.count}/{rate.total}'
 
 
+def matrix(scored: Scored) -> list[Row]:
+    """Return the confusion matrix; of the pairs, those that were not named exactly."""
+    rows = score.confusion(scored.outcomes)
+    return [row for row in rows if scored.kind != 'pairs' or row.exact.count < row.exact.total]
+
+
 def matrix_row(row: Row) -> str:
     """Return what was said of an effect, most frequent first."""
     others = [f'{said} {count}' for said, count in row.said.items() if said != row.truth]
     return ', '.join(others)
+
+
+def one_by_one(scored: Scored) -> str:
+    """Return a line per record."""
+    text = []
+    for each in scored.outcomes:
+        stated = [
+            f'{name} {100 * probability:.0f} %'
+            + (f' (or {", ".join(sorted(twins))})' if twins else '')
+            for name, probability, twins in zip(
+                each.named, each.probabilities, each.twins, strict=True
+            )
+        ]
+        closed = '' if each.closed is None else f'closed {100 * each.closed:.1f} %'
+        mark = 'ok ' if each.exact or (not each.truth and each.verdict == 'adequate') else '-- '
+        text.append(
+            f'{mark}{each.record} {" + ".join(each.truth) or "none":40} {each.verdict:15} '
+            f'{"; ".join(stated)}  {closed}  {each.seconds:.1f} s'
+        )
+    return '\n'.join(text)
 
 
 def as_text(scored: Scored) -> str:
@@ -97,7 +125,7 @@ def as_text(scored: Scored) -> str:
     text += [f'  {name:28}{figure}' for name, figure in lines(scored)]
     text.append(f'  {"calibration error":28}{calibration([scored])}')
     text.append(f'  {"hidden":44}{"exact":>8}{"twins":>8}  said instead')
-    for row in score.confusion(scored.outcomes):
+    for row in matrix(scored):
         counts = f'{share(row.exact):>8}{share(row.within):>8}'
         text.append(f'  {row.truth:44}{counts}  {matrix_row(row)}')
     return '\n'.join(text)
@@ -109,9 +137,13 @@ def as_markdown(sets: Sequence[Scored], split: str, version: str, command: str) 
     text = [
         '# Diagnosis of hidden effects: results on blind records',
         '',
-        f'Made with version {version} by `{command}`, {split} half. The records come from a',
-        'simulator that shares no code with the package (`blind/`); the keys were sealed when the',
-        'records were made and opened after the verdicts. Intervals are Wilson, 95 %.',
+        f'Made with version {version}, {split} half, by',
+        '',
+        f'    {command}',
+        '',
+        'The records come from a simulator that shares no code with the package (`blind/`); the',
+        'keys were sealed when the records were made and opened after the verdicts. Intervals are',
+        'Wilson, 95 %.',
         '',
         f'* Expected calibration error of the probability stated: {calibration(sets)}; '
         'target ≤ 5 %.',
@@ -130,6 +162,6 @@ def as_markdown(sets: Sequence[Scored], split: str, version: str, command: str) 
         text += ['', '| hidden | exactly | within twins | said instead |', '|---|---|---|---|']
         text += [
             f'| {row.truth} | {share(row.exact)} | {share(row.within)} | {matrix_row(row)} |'
-            for row in score.confusion(scored.outcomes)
+            for row in matrix(scored)
         ]
     return '\n'.join(text) + '\n'

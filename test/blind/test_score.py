@@ -160,8 +160,10 @@ def test_that_a_record_is_scored_from_its_files(one_record):
     assert outcome.exact
     assert outcome.twins == (frozenset({'ip_calibration'}),)
     assert outcome.seconds == pytest.approx(4.0 * 4500 / 180)
-    said = CliRunner().invoke(main, ['score', str(one_record.folder)])
+    said = CliRunner().invoke(main, ['score', '--records', str(one_record.folder)])
     assert said.exit_code == 0
+    assert 'ok 0001 air_leak' in said.output
+    assert 'air_leak 97 % (or ip_calibration)  closed 100.0 %' in said.output
     assert 'exactly' in said.output
     assert '100.0 % [20.7, 100.0] (1 of 1)' in said.output
 
@@ -181,7 +183,8 @@ def test_the_table_of_all_sets(one_record):
         table.Scored('clean', 'x', [named((), 'a')]),
     ]
     text = table.as_markdown(sets, 'test', 'abc1234', 'make blind')
-    assert 'version abc1234 by `make blind`' in text
+    assert 'version abc1234, test half' in text
+    assert '    make blind' in text
     assert '| air_leak | 1/1 | 1/1 |  |' in text
     assert '| false alarms | 100.0 % [20.7, 100.0] (1 of 1) |' in text
     assert 'stated 93.5 % ' not in text
