@@ -125,8 +125,8 @@ def write_csv(path: Path, time: np.ndarray, columns: dict[str, np.ndarray]) -> N
     table = np.column_stack((time, *columns.values()))
     lines = [','.join(('t', *columns))]
     lines += [
-        ','.join('' if value != value else f'{value:.6g}' for value in row)
-        for row in table.tolist()
+        ','.join((f'{t:.4f}', *('' if value != value else f'{value:.6g}' for value in row)))
+        for t, *row in table.tolist()
     ]
     aside.write_text('\n'.join(lines) + '\n', encoding='utf-8')
     os.replace(aside, path)

@@ -86,7 +86,7 @@ def draw_plan(rng: Rng, effects: tuple[str, ...], recorder: Recorder, step: floa
 
 
 def run(plan: Plan, physics: Physics, recorder: Recorder, times: np.ndarray) -> Trace:
-    """Simulate the plan from the run-in to the end of the continuation."""
+    """Simulate the plan from the run-in to the last sample."""
     command_times = recorder.period * np.arange(plan.u.size)
     return simulate(plan.u, command_times, times, physics, step=plan.step, origin=RUN_IN)
 
@@ -157,15 +157,15 @@ def draw(
         if 'sensor_quantisation' in effects and rng.random() < 0.5:
             # half of the sensors round the noise too
             recorder.resolution['x'] = plan.changes['sensor_quantisation']['sensor_step']
-        times = sample_times(recorder, plan.u.size, rng)
+        part = record_part(plan, recorder)
+        times = sample_times(recorder, part.stop, rng)
         trace = run(plan, plan.valve(), recorder, times)
         if not plausible(trace):
             continue
         seen: dict[str, dict[str, float]] = {}
         unexplained: dict[str, dict[str, float]] = {}
         for name in effects:
-            part = record_part(plan, recorder)
-            other = run(plan, plan.valve(without=name), recorder, times[: part.stop])
+            other = run(plan, plan.valve(without=name), recorder, times)
             recorded = [Trace(*(row[part] for row in each)) for each in (trace, other)]
             seen[name] = visible(*recorded, recorder.noise, signals)
             if name == 'sensor_quantisation' and steps_show(plan, recorder):
@@ -182,11 +182,22 @@ def draw(
 
 def command_beside(blind: Blind) -> np.ndarray:
     """Return the index of the command that is written beside each sample."""
-    step, count = blind.plan.step, blind.plan.u.size
+    step, count = blind.plan.step, blind.times.size
     if blind.recorder.as_sent:
         return np.arange(count)
     command_steps = np.rint(blind.recorder.period * np.arange(count) / step)
     return np.searchsorted(command_steps, np.rint(blind.times / step), side='right') - 1
+
+
+def write_continuation(blind: Blind, signals: tuple[str, ...], path: Path) -> None:
+    """Write what followed the record as nobody measures it: at exact times, without noise."""
+    plan, period = blind.plan, blind.recorder.period
+    part = record_part(plan, blind.recorder)
+    times = period * np.arange(plan.u.size)
+    trace = run(plan, plan.valve(), blind.recorder, times)
+    after = {'u': plan.u[part.stop :]}
+    after |= {signal: getattr(trace, signal)[part.stop :] for signal in signals}
+    write_csv(path, times[part.stop :] - part.start * period, after)
 
 
 def write(blind: Blind, rng: Rng, name: str, signals: tuple[str, ...], folder: Path) -> None:
@@ -194,12 +205,11 @@ def write(blind: Blind, rng: Rng, name: str, signals: tuple[str, ...], folder: P
     recorder, plan = blind.recorder, blind.plan
     period = recorder.period
     part = record_part(plan, recorder)
-    first, last = part.start, part.stop
     found = measured(blind.trace, recorder, signals, rng)
     columns = {'u': plan.u[command_beside(blind)], **found}
-    stamps = blind.times - first * period
+    stamps = blind.times - part.start * period
     jitter = np.clip(rng.standard_normal(stamps.size), -3, 3) * recorder.stamp_jitter * period
-    nominal = period * (np.arange(stamps.size) - first)
+    nominal = period * (np.arange(stamps.size) - part.start)
     stamps = np.round(stamps + jitter, 4) if rng.random() < 0.3 else nominal
     (folder / 'records').mkdir(parents=True, exist_ok=True)
     (folder / 'keys').mkdir(parents=True, exist_ok=True)
@@ -208,16 +218,13 @@ def write(blind: Blind, rng: Rng, name: str, signals: tuple[str, ...], folder: P
             folder / 'records' / name,
             nominal[part] + 1e-4,
             plan.u[part],
-            (blind.times - first * period + 2e-4 + np.abs(jitter))[part],
+            (blind.times - part.start * period + 2e-4 + np.abs(jitter))[part],
             {signal: values[part] for signal, values in found.items()},
         )
     else:
         in_part = {signal: values[part] for signal, values in columns.items()}
         write_csv(folder / 'records' / f'{name}.csv', stamps[part], in_part)
-    # what nobody measures: the signals that follow, without noise
-    after = {'u': columns['u'][last:]}
-    after |= {signal: getattr(blind.trace, signal)[last:] for signal in signals}
-    write_csv(folder / 'keys' / f'{name}.next.csv', nominal[last:], after)
+    write_continuation(blind, signals, folder / 'keys' / f'{name}.next.csv')
     key = {
         'effects': list(plan.changes),
         'parameters': plan.changes,
