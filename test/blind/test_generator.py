@@ -55,7 +55,7 @@ def test_that_records_are_read_and_say_nothing_of_the_key(made):
         assert recording.signals == ('p2', 'x')
         assert recording.time[-1] == pytest.approx(key['length'], abs=1.0)
         assert recording.provenance.comments == ()
-        assert recording.quality.period == pytest.approx(key['recorder']['period'])
+        assert recording.quality.period == pytest.approx(key['recorder']['period'], rel=0.02)
 
 
 def test_that_the_set_is_sealed(made, tmp_path):
