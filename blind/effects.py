@@ -115,7 +115,7 @@ def rate_limit(rng: Rng, valve: Physics, length: float) -> Changes:
 
 def hysteresis(rng: Rng, valve: Physics, length: float) -> Changes:
     """Remember, distributed: weighted plays or Bouc-Wen, of the transducer or of x."""
-    size = log_uniform(rng, 1.0, 6.0)
+    size = log_uniform(rng, 0.6, 5.0)
     return {
         'hysteresis_kind': float(rng.choice((1.0, 2.0))),
         'hysteresis_at': float(rng.random() < 0.4),
@@ -217,7 +217,7 @@ def vibration(rng: Rng, valve: Physics, length: float) -> Changes:
 
 def linkage_backlash(rng: Rng, valve: Physics, length: float) -> Changes:
     """Leave play between stem and sensor."""
-    return {'linkage': log_uniform(rng, 0.3, 3.0)}
+    return {'linkage': log_uniform(rng, 0.2, 2.5)}
 
 
 def sensor_lag(rng: Rng, valve: Physics, length: float) -> Changes:
