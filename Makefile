@@ -8,6 +8,7 @@ DISTRO ?= jazzy
 PYTHON ?= python3
 PYTEST_ARGS ?=
 DEMO_ARGS ?=
+BLIND_ARGS ?=
 UV_VERSION := 0.13.8
 
 ifeq ($(filter $(DISTRO),jazzy kilted),)
@@ -37,7 +38,7 @@ unexport NUMBA_DISABLE_JIT
 ISOLATED = logs=$$(mktemp -d) && trap 'rm -rf "$$logs"' EXIT && export ROS_LOG_DIR=$$logs \
 	ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST ROS_DOMAIN_ID=$$(( $$$$ % 101 + 1 )) &&
 
-.PHONY: help demo test lint format bench lower-bounds colcon lock clean check-python
+.PHONY: help demo test lint format bench blind blind-tuning lower-bounds colcon lock clean check-python
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
 
@@ -65,6 +66,12 @@ bench: $(VENV)/.ready  ## speed of the model and of the identification
 	@set -e; for script in benchmarks/[a-z]*.py; do \
 	  test -e "$$script" || { echo 'make bench: no benchmarks/*.py yet' >&2; exit 1; }; \
 	  echo "$$script"; $(ISOLATED) $(BIN)/python "$$script"; done
+
+blind: $(VENV)/.ready  ## diagnose hidden effects on blind records (hours); table in doc/blind.md
+	@$(BIN)/python -m blind study --split test --doc doc/blind.md $(BLIND_ARGS)
+
+blind-tuning: $(VENV)/.ready  ## the same on the half that thresholds may be set on, no table
+	@$(BIN)/python -m blind study --split tuning $(BLIND_ARGS)
 
 lower-bounds: $(LOWER)/.ready  ## the fast tests on the oldest supported libraries
 	@$(CURDIR)/$(LOWER)/bin/python -m pytest -m 'not slow' --ignore=test/test_packaging.py $(PYTEST_ARGS)

@@ -67,7 +67,7 @@ EFFECT = Effect(
         ),
     ),
     slots={'flow_slot': flow, 'motion_slot': motion},
-    longest_step=0.04,
+    longest_step=0.01,
     order=10,
     variants=(('ratio',), ('ratio', 'displacement')),
     explanation='The opening stem enlarges the chamber, so the same flow raises p2 more slowly.',

@@ -32,7 +32,7 @@ EFFECT = Effect(
     ),
     slots={'command_slot': command},
     memory=1,
-    longest_step=0.1,
+    longest_step=0.04,
     order=0,
     variants=(('gain',), ('gain', 'integral_gain')),
     explanation='A positioner compares the stem with the command and drives the converter harder.',

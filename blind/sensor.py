@@ -1,0 +1,28 @@
+# Copyright 2026 The valve_sim_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Stem position to measured position: linkage, hysteresis, lag, line, drift and steps."""
+
+from math import floor, pi, sin
+
+import numba
+
+from . import state as at
+from .inlet import hysteresis, play
+
+
+@numba.njit
+def sense(s, q, h, t):
+    """Advance the sensor; its reading goes to the state XM."""
+    s[at.LINK] = play(s[at.X], s[at.LINK], q.linkage)
+    x = s[at.LINK]
+    if q.hysteresis_kind > 0.0 and q.hysteresis_at == 1.0:
+        x = hysteresis(x, s, q)
+    if q.cyclic > 0.0:
+        x += q.cyclic * sin(2.0 * pi * x / q.cyclic_period)
+    if q.sensor_tau > 0.0:
+        s[at.SENSED] += (x - s[at.SENSED]) * h / (q.sensor_tau + 0.5 * h)
+        x = s[at.SENSED]
+    x = q.sensor_zero + q.sensor_span * x + q.sensor_drift * max(t, 0.0)
+    if q.sensor_step > 0.0:
+        x = q.sensor_step * floor(x / q.sensor_step + 0.5)
+    s[at.XM] = x

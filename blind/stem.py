@@ -1,0 +1,119 @@
+# Copyright 2026 The valve_sim_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Chamber pressure to stem position: spring, stops, flow, and dry friction that sticks."""
+
+from math import exp, pi, sin
+
+import numba
+
+from . import state as at
+from .inlet import pulse
+
+
+@numba.njit
+def push(p2, x, s, q, t):
+    """Return the force on the stem without friction [% of span]."""
+    force = p2 - q.preload - q.spring_rate * x
+    force -= q.spring_cubic * x * (0.01 * x) ** 2 + q.spring_bow * 4e-4 * x * (100.0 - x)
+    if q.fluid != 0.0:
+        if q.fluid_kind == 0.0:
+            force += q.fluid * exp(-max(x, 0.0) / q.fluid_fall)
+        else:
+            force += q.fluid * max(1.0 - 0.01 * x, 0.0) ** 2
+    if q.vibration > 0.0:
+        force += q.vibration * sin(q.vibration_omega * t)
+    force -= q.relaxation * (x - s[at.CREEP])
+    if q.area_wave != 0.0:
+        force += q.area_wave * sin(2.0 * pi * p2 / q.area_period)
+    if q.kick > 0.0:
+        force += q.kick * pulse(t, q.kick_interval, 0.4)
+    return force
+
+
+@numba.njit
+def contact(x, q):
+    """Return the force of a yielding end stop; stiff ones are limits instead."""
+    if q.stop_stiffness == 0.0:
+        return 0.0
+    if x < q.stop_low:
+        return q.stop_stiffness * (q.stop_low - x)
+    if x > q.stop_high:
+        return q.stop_stiffness * (q.stop_high - x)
+    return 0.0
+
+
+@numba.njit
+def friction_scale(direction, x, q, t):
+    """Return the factor on both friction levels here and now."""
+    scale = (1.0 + q.asymmetry * direction) * (1.0 + q.friction_drift * max(t, 0.0))
+    scale *= 1.0 + q.friction_slope * 0.01 * min(max(x, 0.0), 100.0)
+    if q.bump > 0.0:
+        scale *= 1.0 + q.bump * exp(-(((x - q.bump_at) / q.bump_width) ** 2))
+    if q.swing > 0.0:
+        scale *= 1.0 + q.swing * sin(q.swing_omega * t)
+    return max(scale, 0.05)
+
+
+@numba.njit
+def breakaway(rest, q):
+    """Return the static friction after this time at rest."""
+    if q.dwell_gain == 0.0:
+        return q.f_s
+    if q.dwell_rational > 0.0:
+        return q.f_s * (1.0 + q.dwell_gain * rest / (rest + q.dwell_time))
+    return q.f_s * (1.0 + q.dwell_gain * (1.0 - exp(-rest / q.dwell_time)))
+
+
+@numba.njit
+def coulomb(force, s, q, h, t):
+    """Return the new speed of a stem with a breakaway force that drops at once."""
+    v = s[at.V]
+    direction = 1.0 if (force if v == 0.0 else v) > 0.0 else -1.0
+    scale = friction_scale(direction, s[at.X], q, t)
+    if v == 0.0:
+        s[at.REST] += h
+        if abs(force) <= scale * breakaway(s[at.REST], q):
+            return 0.0
+        s[at.REST] = 0.0
+    level = q.f_d
+    if q.stribeck > 0.0:
+        level += (q.f_s - q.f_d) * exp(-((v / q.stribeck) ** 2))
+    new = (v + h * q.a_1 * (force - direction * scale * level)) / (1.0 + h * q.a_2)
+    if new * direction <= (q.delta if v != 0.0 else 0.0):
+        return 0.0
+    return new
+
+
+@numba.njit
+def bristles(force, s, q, h, t):
+    """Return the new speed of a stem held by elastic bristles (LuGre; Dahl without the drop)."""
+    v, z = s[at.V], s[at.BRISTLE]
+    level = q.f_d
+    if q.dahl == 0.0:
+        level += (q.f_s - q.f_d) * exp(-((v / q.bristle_stribeck) ** 2))
+    level *= friction_scale(1.0 if v > 0.0 else -1.0, s[at.X], q, t)
+    keep = 1.0 / (1.0 + h * q.bristle * abs(v) / level)
+    elastic = q.bristle * keep * z + q.bristle_damping * (keep - 1.0) * z / h
+    inertia = 1.0 + h * q.a_2 + h * q.a_1 * keep * (h * q.bristle + q.bristle_damping)
+    new = (v + h * q.a_1 * (force - elastic)) / inertia
+    s[at.BRISTLE] = keep * (z + h * new)
+    return new
+
+
+@numba.njit
+def stem(p2, s, q, h, t):
+    """Advance the stem (the speed first, then the position with the new speed)."""
+    x = s[at.X]
+    force = push(p2, x, s, q, t) + contact(x, q)
+    if q.bristle > 0.0:
+        v = bristles(force, s, q, h, t)
+    else:
+        v = coulomb(force, s, q, h, t)
+    v = min(max(v, -q.v_down), q.v_up)
+    x += h * v
+    if q.stop_stiffness == 0.0:
+        limited = min(max(x, q.stop_low), q.stop_high)
+        if limited != x:
+            x, v = limited, 0.0
+    s[at.X], s[at.V] = x, v
+    s[at.CREEP] += h * (x - s[at.CREEP]) / q.relaxation_time
