@@ -3,7 +3,9 @@
 """How every node of the package starts, spins and ends."""
 
 from collections.abc import Callable, Sequence
+from functools import wraps
 import sys
+from typing import Any
 
 import rclpy
 from rclpy._rclpy_pybind11 import RCLError  # rclpy exports it nowhere else
@@ -29,6 +31,21 @@ REFUSALS = (
 def new_executor() -> EventsExecutor:
     """Return the executor the nodes run on; it costs a third of the single-threaded one."""
     return EventsExecutor()
+
+
+def ends_quietly(callback: Callable[..., Any]) -> Callable[..., Any]:
+    """Wrap a node's callback: a signal may end ROS between two publications of it."""
+
+    @wraps(callback)
+    def wrapped(node: Node, *arguments: Any) -> Any:
+        try:
+            return callback(node, *arguments)
+        except RCLError:
+            if node.context.ok():
+                raise
+            return None
+
+    return wrapped
 
 
 def spin(node: Node) -> None:
