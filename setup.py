@@ -71,8 +71,8 @@ setup(
     },
     entry_points={
         'console_scripts': [
-            'valve_plant = valve_sim_ros.nodes.valve_plant:main',
-            'valve_identifier = valve_sim_ros.nodes.valve_identifier:main',
+            'valve_plant = valve_sim_ros.nodes.start:valve_plant',
+            'valve_identifier = valve_sim_ros.nodes.start:valve_identifier',
             'valve_sim = valve_sim_ros.cli:main',
         ],
     },

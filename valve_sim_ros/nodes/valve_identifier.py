@@ -21,6 +21,7 @@ from ..identification.identify import identify
 from ..identification.result import Identification
 from ..model.parameters import PAPER_SEVEN
 from .spinning import run
+from .start import valve_identifier
 
 LATCHED = QoSProfile(
     depth=1,
@@ -198,4 +199,4 @@ def main(args: Sequence[str] | None = None) -> None:
 
 
 if __name__ == '__main__':
-    main()
+    valve_identifier()

@@ -20,6 +20,7 @@ from .messages import INPUT, labelled, LOSSLESS, LOSSLESS_LATCHED, OUTPUT, publi
 from .pacing import Lockstep, make_pacing
 from .parameters import ValveParameters
 from .spinning import ends_quietly, run
+from .start import valve_plant
 from .watchdog import Watchdog
 
 SAMPLE = 't,u,p1,p2,x'
@@ -173,7 +174,7 @@ class ValvePlant(Node):
     def _warn(self, trouble: str, text: str) -> None:
         """Log a warning, but the same trouble only every so often."""
         now = time.monotonic()  # rclpy's own throttle costs half a millisecond a call
-        if now >= self._quiet_until.get(trouble, 0.0):
+        if now >= self._quiet_until.get(trouble, 0.0) and self.context.ok():
             self._quiet_until[trouble] = now + REPORT_PERIOD
             self.get_logger().warning(text)
 
@@ -233,4 +234,4 @@ def main(args: Sequence[str] | None = None) -> None:
 
 
 if __name__ == '__main__':
-    main()
+    valve_plant()
