@@ -49,7 +49,7 @@ class ValvePlant(Node):
         """Declare the parameters and connect; `options` go to rclpy's Node."""
         super().__init__(node_name, **options)
         self._valve_parameters = ValveParameters(self, self._apply)
-        self._settings = self._valve_parameters.settings
+        self._settings = self._valve_parameters.values
         self.sample_time = self._settings['sample_time']
         self.refused_commands = self.clamped_commands = self._logged_misses = 0
         self._reported = (0, 0, 0)
@@ -194,6 +194,8 @@ class ValvePlant(Node):
         if self.watchdog.stale:
             troubles.append(f'no command for {age:.3g} s: {self._settings["fail_action"]}')
         return troubles, {
+            'model': self.spec.model,
+            'effects': ', '.join(self.spec.effects) or 'none',
             'pacing': type(self.pacing).__name__,
             'paused': self.pacing.paused,
             'samples': self.samples,

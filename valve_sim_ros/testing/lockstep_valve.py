@@ -153,8 +153,8 @@ class LockstepValve:
         self._spin(
             lambda: len(self.samples) >= before + samples, 'the controller sent no further command'
         )
-        columns = np.array(self.samples[before:]).T.copy()
-        return Simulation(*columns, self.plant.spec)
+        t, u, p1, p2, x = np.array(self.samples[before:]).T.copy()
+        return Simulation(t, u, p1, p2, x, self.plant.spec)
 
     def close(self) -> None:
         """Take everything down."""
@@ -189,4 +189,5 @@ class LockstepValve:
 
 def as_parameters(spec: ValveSpec) -> dict[str, Any]:
     """Return a valve as the parameters of the plant node."""
-    return {**spec.values, 'branch': spec.branch}
+    options = {'branch': spec.branch, 'model': spec.model}
+    return {**spec.values, **options, 'effects': list(spec.effects) or ['']}
