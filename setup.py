@@ -72,6 +72,8 @@ setup(
     entry_points={
         'console_scripts': [
             'valve_plant = valve_sim_ros.nodes.start:valve_plant',
+            'valve_rack = valve_sim_ros.nodes.start:valve_rack',
+            'pi_controller = valve_sim_ros.nodes.start:pi_controller',
             'valve_identifier = valve_sim_ros.nodes.start:valve_identifier',
             'valve_sim = valve_sim_ros.cli:main',
         ],

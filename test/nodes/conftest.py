@@ -43,6 +43,10 @@ class Bench:
     """Spins the nodes of a test until something has happened."""
 
     def __init__(self):
+        self.renew()
+
+    def renew(self):
+        """Begin again, in the context that rclpy has now."""
         self.executor = new_executor()
         self.nodes = []
 

@@ -35,11 +35,16 @@ def catches_sigterm(process):
 
 @pytest.mark.parametrize(
     ('command', 'arguments'),
-    [('valve_plant', ['--ros-args', '-p', 'sample_time:=0.001']), ('valve_identifier', [])],
+    [
+        ('valve_plant', ['--ros-args', '-p', 'sample_time:=0.001']),
+        ('valve_rack', ['3', '--ros-args', '-p', 'sample_time:=0.01']),
+        ('pi_controller', ['--ros-args', '-p', 'lockstep:=true']),
+        ('valve_identifier', []),
+    ],
 )
 def test_signal_at_any_moment(command, arguments):
     random.seed(command)
-    for number in (signal.SIGINT, signal.SIGTERM) * 3:
+    for number in (signal.SIGINT, signal.SIGTERM) * 2:
         process = start(command, *arguments)
         try:
             while not catches_sigterm(process):

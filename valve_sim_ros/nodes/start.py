@@ -49,6 +49,16 @@ def valve_plant() -> None:
     _run('valve_plant')
 
 
+def valve_rack() -> None:
+    """Run several simulated valves in one process."""
+    _run('valve_rack')
+
+
+def pi_controller() -> None:
+    """Run the PI controller."""
+    _run('pi_controller')
+
+
 def valve_identifier() -> None:
     """Run the identifier."""
     _run('valve_identifier')
