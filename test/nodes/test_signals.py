@@ -39,6 +39,7 @@ def catches_sigterm(process):
         ('valve_plant', ['--ros-args', '-p', 'sample_time:=0.001']),
         ('valve_rack', ['3', '--ros-args', '-p', 'sample_time:=0.01']),
         ('pi_controller', ['--ros-args', '-p', 'lockstep:=true']),
+        ('valve_twin', []),
         ('valve_identifier', []),
     ],
 )

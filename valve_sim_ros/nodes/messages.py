@@ -31,6 +31,9 @@ OUTPUT = QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE)
 INPUT = QoSProfile(depth=10, reliability=ReliabilityPolicy.BEST_EFFORT)
 """Hears reliable and best-effort publishers."""
 
+HISTORY = QoSProfile(depth=1000, reliability=ReliabilityPolicy.BEST_EFFORT)
+"""Hears everybody, and keeps what comes while the node is busy."""
+
 LOSSLESS = QoSProfile(depth=1000, reliability=ReliabilityPolicy.RELIABLE)
 """For lockstep, where a lost message would be a lost sample."""
 

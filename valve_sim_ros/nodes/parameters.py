@@ -36,6 +36,21 @@ class Switch:
 
 
 @dataclass(frozen=True)
+class Text:
+    """A parameter that is any text."""
+
+    name: str
+    description: str
+    default: str = ''
+
+    def checked(self, value: object) -> str:
+        """Return `value`, or raise a ModelError if it is no text."""
+        if not isinstance(value, str):
+            raise ModelError(f'{self.name} = {value!r}: expected a text')
+        return value
+
+
+@dataclass(frozen=True)
 class Names:
     """A parameter that is a list of names; ROS cannot type an empty list, so [''] is one too."""
 
@@ -86,7 +101,7 @@ LIVE = (INITIAL_COMMAND, *INITIAL_STATE, *watchdog.LIVE)
 EFFECT_NAMES = Names(EFFECTS, f'Effects added to model base, of {", ".join(CATALOGUE)}')
 OF_ROS = ('use_sim_time', 'start_type_description_service', 'qos_overrides')
 
-Declaration = Parameter | Option | Switch | Names
+Declaration = Parameter | Option | Switch | Text | Names
 
 
 def descriptor(declared: Declaration, fixed: bool = False) -> ParameterDescriptor:
@@ -166,8 +181,16 @@ class ValveParameters(Settings):
         The valve in force.
     """
 
-    def __init__(self, node: Node, apply: Callable[[ValveSpec], None]) -> None:
+    def __init__(
+        self,
+        node: Node,
+        apply: Callable[[ValveSpec], None],
+        fixed: Sequence[Declaration] = FIXED,
+        live: Sequence[Declaration] = LIVE,
+    ) -> None:
         """Declare them all; `apply` receives the new valve after each accepted change.
+
+        `fixed` and `live` are the node's own parameters, as for `Settings`.
 
         Raises
         ------
@@ -178,15 +201,15 @@ class ValveParameters(Settings):
         self._model = declare(node, MODEL, fixed=True)
         base = self._model == BASE_MODEL
         most = ValveSpec(model=self._model, effects=tuple(CATALOGUE) if base else ())
-        declared = (*most.parameters, BRANCH)
+        declared: tuple[Declaration, ...] = (*most.parameters, BRANCH)
         names = [one.name for one in declared]
-        others = (one.name for one in (MODEL, *FIXED, *LIVE))
+        others = (one.name for one in (MODEL, *fixed, *live))
         refuse_unknown(node, [*names, EFFECTS, *others])
         self._held: dict[str, Any] = {one.name: declare(node, one) for one in declared}
         self._held[EFFECTS] = declare(node, EFFECT_NAMES)
         given = node._parameter_overrides.keys() & self._held.keys()
         self.spec = self._valve({name: self._held[name] for name in given})
-        super().__init__(node, FIXED, LIVE)
+        super().__init__(node, fixed, live)
 
     def _accept(self, parameters: Sequence[RosParameter]) -> None:
         """Put an accepted change in force and hand the valve on."""

@@ -59,6 +59,11 @@ def pi_controller() -> None:
     _run('pi_controller')
 
 
+def valve_twin() -> None:
+    """Run the live twin of a valve."""
+    _run('valve_twin')
+
+
 def valve_identifier() -> None:
     """Run the identifier."""
     _run('valve_identifier')
