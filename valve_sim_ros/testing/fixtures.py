@@ -4,6 +4,7 @@
 
 from collections.abc import Callable, Iterator
 import os
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -14,7 +15,7 @@ from .lockstep_valve import LockstepValve
 
 
 @pytest.fixture
-def lockstep_valve() -> Iterator[Callable[..., LockstepValve]]:
+def lockstep_valve(tmp_path: Path) -> Iterator[Callable[..., LockstepValve]]:
     """Return what makes a `LockstepValve`; all of them are taken down after the test.
 
     ROS is started in a domain of its own on the loopback device, unless the test did so itself
@@ -23,6 +24,7 @@ def lockstep_valve() -> Iterator[Callable[..., LockstepValve]]:
     claim = None
     started = not rclpy.ok()
     if started:
+        os.environ.setdefault('ROS_LOG_DIR', str(tmp_path))
         os.environ.setdefault('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
         domain = None
         if 'ROS_DOMAIN_ID' not in os.environ:
