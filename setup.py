@@ -71,8 +71,11 @@ setup(
     },
     entry_points={
         'console_scripts': [
-            'valve_plant = valve_sim_ros.nodes.valve_plant:main',
-            'valve_identifier = valve_sim_ros.nodes.valve_identifier:main',
+            'valve_plant = valve_sim_ros.nodes.start:valve_plant',
+            'valve_rack = valve_sim_ros.nodes.start:valve_rack',
+            'valve_twin = valve_sim_ros.nodes.start:valve_twin',
+            'pi_controller = valve_sim_ros.nodes.start:pi_controller',
+            'valve_identifier = valve_sim_ros.nodes.start:valve_identifier',
             'valve_sim = valve_sim_ros.cli:main',
         ],
     },

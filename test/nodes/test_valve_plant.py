@@ -170,7 +170,10 @@ def test_ends_silently_under_a_namespace_with_a_file(ros, tmp_path, number):
     heard = []
     peer.create_subscription(Float64, 'p1', lambda m: heard.append(m.data), 10)
     file = tmp_path / 'valve.yaml'
-    file.write_text('/**:\n  ros__parameters:\n    f_d1: 5\n    initial_command: 50.0\n')
+    file.write_text(
+        '/**:\n  ros__parameters:\n    f_d1: 5\n    initial_command: 50.0\n'
+        '    sample_time: 1.0\n'  # so long that a busy machine misses no period, and warns of none
+    )
     process = run_plant('--ros-args', '-r', '__ns:=/plant_7', '--params-file', str(file))
     try:
         until(lambda: heard)

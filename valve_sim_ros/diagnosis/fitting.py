@@ -42,8 +42,8 @@ SCREENING, COARSE = 0.1, 0.04
 """Steps inside a sample while candidates are screened, and fitted [s]."""
 SPREAD = 5.0
 """Standard deviation with which an evolution begins [steps of the unknowns]."""
-POPULATION = 10
-ROUNDS = ((40, 10), (12, 16), (5, 30))
+POPULATION = 14
+ROUNDS = ((40, 5), (10, 14), (4, 30))
 """Rounds of a race where costs are rugged: how many still run, and for how many generations."""
 FINISHERS = 5
 """ So many are refitted to the end."""

@@ -14,7 +14,13 @@ from .parameters import BRANCH, SAMPLE_TIME
 from .spec import BASE_MODEL, EFFECTS, MODEL, ValveSpec
 
 NODE_ONLY = frozenset(
-    {SAMPLE_TIME.name, 'initial_command', 'use_sim_time', 'start_type_description_service'}
+    {
+        SAMPLE_TIME.name,
+        *('use_sim_time', 'start_type_description_service', 'qos_overrides'),
+        *('initial_command', 'initial_p1', 'initial_p2', 'initial_x'),
+        *('pacing', 'speed_factor', 'publish_sample', 'diagnostics_period'),
+        *('command_timeout', 'fail_action', 'fail_position', 'fail_value'),
+    }
 )
 """Parameters of the node that say nothing about the valve."""
 

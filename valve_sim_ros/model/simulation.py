@@ -4,6 +4,7 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+import math
 import threading
 from typing import Any, NamedTuple
 
@@ -241,6 +242,12 @@ class Valve:
         self._first = False
         self._position = float(x)
         return float(self._state[0]), float(self._state[1]), self._position
+
+    def impose(self, p1: float = math.nan, p2: float = math.nan) -> None:
+        """Replace pressures [% of span] between two samples, e.g. by measured ones; NaN: none."""
+        for index, value in enumerate((p1, p2)):
+            if math.isfinite(value):
+                self._state[index] = float(value)
 
     def _prepare(self, make: Make) -> None:
         """Start with the interpreted step and have the machine code made or fetched."""

@@ -3,7 +3,11 @@
 """How every node of the package starts, spins and ends."""
 
 from collections.abc import Callable, Sequence
+from functools import wraps
+import signal
 import sys
+import threading
+from typing import Any
 
 import rclpy
 from rclpy._rclpy_pybind11 import RCLError  # rclpy exports it nowhere else
@@ -31,49 +35,79 @@ def new_executor() -> EventsExecutor:
     return EventsExecutor()
 
 
-def spin(node: Node) -> None:
+def ends_quietly(callback: Callable[..., Any]) -> Callable[..., Any]:
+    """Wrap a node's callback: a signal may end ROS between two publications of it."""
+
+    @wraps(callback)
+    def wrapped(node: Node, *arguments: Any) -> Any:
+        try:
+            return callback(node, *arguments)
+        except RCLError:
+            if node.context.ok():
+                raise
+            return None
+
+    return wrapped
+
+
+def spin(nodes: Sequence[Node]) -> None:
     """Spin until the context is shut down (SIGINT, SIGTERM)."""
     executor = new_executor()
-    executor.add_node(node)
+    for node in nodes:
+        executor.add_node(node)
     try:
         # spin() of this executor ignores signals, a bounded spin_once does not
         while rclpy.ok():
             executor.spin_once(timeout_sec=0.2)
-    except (KeyboardInterrupt, ExternalShutdownException):
+    except ExternalShutdownException:
         pass
     finally:
         executor.shutdown()
 
 
-def run(make: Callable[[], Node], args: Sequence[str] | None = None, once: bool = False) -> int:
-    """Make a node, spin it (not at all if `once`), and end in the order that never aborts.
+def run(
+    make: Callable[[], Node | list[Node]], args: Sequence[str] | None = None, once: bool = False
+) -> int:
+    """Make nodes, spin them (not at all if `once`), and end in the order that never aborts.
 
     Returns
     -------
     int
         Exit code: 0 after SIGINT or SIGTERM, 1 with a sentence on stderr after bad input.
     """
-    node = None
+    nodes: list[Node] = []
+    told = _hear_signals()
+    started = False
     try:
         rclpy.init(args=list(args) if args is not None else None)
-        node = make()
-        if not once:
-            spin(node)
-    except REFUSALS as error:
-        print(f'refused: {error}', file=sys.stderr)
-        return 1
-    except (KeyboardInterrupt, ExternalShutdownException):
+        started = True
+        made = make() if not told else []
+        nodes = made if isinstance(made, list) else [made]
+        if not once and not told:
+            spin(nodes)
+    except ExternalShutdownException:
         pass
+    except REFUSALS as error:
+        if not started or rclpy.ok():  # else a signal came while the nodes were made
+            print(f'refused: {error}', file=sys.stderr)
+            return 1
     finally:
-        _end(node)
+        for node in nodes:
+            node.destroy_node()
+        rclpy.try_shutdown()
     return 0
 
 
-def _end(node: Node | None) -> None:
-    """Take the node down; a second SIGINT meanwhile changes nothing."""
-    try:
-        if node is not None:
-            node.destroy_node()
-        rclpy.try_shutdown()
-    except KeyboardInterrupt:
-        rclpy.try_shutdown()
+def _hear_signals() -> list[int]:
+    """Let signals interrupt nothing: rclpy ends the context on them, and that ends the spinning.
+
+    Returns
+    -------
+    list of int
+        Grows with each signal.
+    """
+    told: list[int] = []
+    if threading.current_thread() is threading.main_thread():
+        for number in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(number, lambda number, _: told.append(number))
+    return told

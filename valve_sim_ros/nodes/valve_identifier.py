@@ -11,22 +11,19 @@ from rcl_interfaces.msg import IntegerRange, ParameterDescriptor
 from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
 from rclpy.parameter import Parameter as RosParameter
-from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.utilities import remove_ros_args
-from std_msgs.msg import Float64, Float64MultiArray, MultiArrayDimension, MultiArrayLayout, String
-from std_srvs.srv import Trigger
+from std_msgs.msg import Float64, Float64MultiArray, String
 
 from ..identification.errors import IdentificationError
 from ..identification.identify import identify
 from ..identification.result import Identification
 from ..model.parameters import PAPER_SEVEN
+from .diagnosing import DiagnoseService, Material
+from .long_service import Job, LongService
+from .messages import labelled, LATCHED
 from .spinning import run
+from .start import valve_identifier
 
-LATCHED = QoSProfile(
-    depth=1,
-    reliability=ReliabilityPolicy.RELIABLE,
-    durability=DurabilityPolicy.TRANSIENT_LOCAL,
-)
 ONCE = '--once'
 USAGE = f'valve_identifier [{ONCE}] [BAG...] [--ros-args ...]'
 SEEDS = IntegerRange(from_value=0, to_value=2**31 - 1, step=1)
@@ -34,6 +31,8 @@ SEEDS = IntegerRange(from_value=0, to_value=2**31 - 1, step=1)
 
 class ValveIdentifier(Node):
     """Fits the valve to recordings, at the start and whenever `~/identify` is called.
+
+    `~/diagnose` says what the model lacks; the answer comes on `~/diagnosis` (JSON) as well.
 
     Publishes, for late joiners too, `~/parameters` (Float64MultiArray, the names as label),
     `~/eta` (Float64, %) and `~/result` (String, the content of identify.json). A failed
@@ -67,7 +66,8 @@ class ValveIdentifier(Node):
             'eta': self.create_publisher(Float64, '~/eta', LATCHED),
             'result': self.create_publisher(String, '~/result', LATCHED),
         }
-        self.create_service(Trigger, '~/identify', self._serve)
+        LongService(self, '~/identify', self._prepare)
+        DiagnoseService(self, self._material, self._folder)
         if once or (self._texts('bags') and self.get_parameter('identify_at_start').value):
             self.identify()
 
@@ -81,14 +81,8 @@ class ValveIdentifier(Node):
         IdentificationError
             If there is no bag, nothing can be identified, or the result cannot be written.
         """
-        bags = self._texts('bags')
-        if not bags:
-            raise IdentificationError(
-                'no bag to identify from: give the paths of one or more recordings as arguments '
-                'or in the parameter bags'
-            )
         result = identify(
-            bags,
+            self._bags(),
             topics=self._topics(),
             seed=self.get_parameter('seed').value,
             hold_out=self.get_parameter('hold_out').value,
@@ -100,7 +94,7 @@ class ValveIdentifier(Node):
 
     def _write(self, result: Identification) -> None:
         """Write fitted.yaml and identify.json where the parameters say, if anywhere."""
-        folder = self.get_parameter('output_directory').value
+        folder = self._folder()
         if not folder:
             return
         try:
@@ -115,30 +109,21 @@ class ValveIdentifier(Node):
         """Put the result on the latched topics and in the log."""
         names = [parameter.name for parameter in PAPER_SEVEN]
         values = [float(result.spec.values[name]) for name in names]
-        size = len(names)
-        dimension = MultiArrayDimension(label=','.join(names), size=size, stride=size)
-        self._latched['parameters'].publish(
-            Float64MultiArray(layout=MultiArrayLayout(dim=[dimension]), data=values)
-        )
+        self._latched['parameters'].publish(labelled(','.join(names), values))
         self._latched['eta'].publish(Float64(data=float(result.eta)))
         text = json.dumps(result.as_json(), allow_nan=False)
         self._latched['result'].publish(String(data=text))
         for line in result.lines():
             self.get_logger().info(line)
 
-    def _serve(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        """Answer `~/identify` when the fit is done, with the reason if it cannot be."""
-        try:
-            result = self.identify()
-        except ValueError as error:
-            self.get_logger().error(str(error))
-            response.success, response.message = False, str(error)
-        except (KeyboardInterrupt, ExternalShutdownException):
-            # let past the executor, it would be printed with its traceback
-            response.success, response.message = False, 'ended before the fit was done'
-        else:
-            response.success, response.message = True, f'eta = {result.eta:.4f} %'
-        return response
+    def _prepare(self) -> Job:
+        """Begin the answer to `~/identify`; it comes when the fit is done."""
+        return lambda: f'eta = {self.identify().eta:.4f} %'
+
+    def _material(self) -> Material:
+        """Return what `~/diagnose` works on."""
+        seed = self.get_parameter('seed').value
+        return self._bags(), {'topics': self._topics(), 'seed': seed}
 
     def _progress(self, share: float, text: str) -> None:
         """Say how far the fit is; give it up once the node is told to end."""
@@ -169,6 +154,20 @@ class ValveIdentifier(Node):
         """Return a list parameter without its empty entries."""
         return [text for text in self.get_parameter(name).value or [] if text]
 
+    def _bags(self) -> list[str]:
+        """Return the recordings, or raise an IdentificationError if there is none."""
+        bags = self._texts('bags')
+        if not bags:
+            raise IdentificationError(
+                'no bag to identify from: give the paths of one or more recordings as arguments '
+                'or in the parameter bags'
+            )
+        return bags
+
+    def _folder(self) -> str:
+        """Return where results shall be written; '' is nowhere."""
+        return str(self.get_parameter('output_directory').value)
+
     def _topics(self) -> dict[str, str]:
         """Return the topic by signal from the parameter `topics`."""
         topics = {}
@@ -198,4 +197,4 @@ def main(args: Sequence[str] | None = None) -> None:
 
 
 if __name__ == '__main__':
-    main()
+    valve_identifier()
