@@ -4,6 +4,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 import math
 from typing import Any, NamedTuple
 
@@ -12,7 +13,7 @@ import numpy as np
 from ..model.composition import compose
 from ..model.kernels import scored
 from ..model.parameters import DELTA
-from ..model.pipeline import Array, State
+from ..model.pipeline import Array
 from ..recordings.recording import OUTPUTS, Recording
 
 OUTLIER = 6.0
@@ -21,7 +22,7 @@ KEPT_GRIDS = 60
 JITTER = 0.1
 """Uncertainty of when a sample was taken, as a share of the period."""
 TRAVEL, MOST_UNSETTLED = 8.0, 0.1
-"""A record counts once the valve has travelled this far [%], and after this share at the latest."""
+"""A record counts once the valve has travelled this far [%], or after this share."""
 REST = 5
 """Samples over which two means agree while the stem rests."""
 LEAST_NOISE = 0.02
@@ -59,6 +60,16 @@ class Stretch:
     noise: dict[str, Array] = field(default_factory=dict)
     rests: Array = field(default_factory=lambda: np.empty(0))
     _grids: dict[Any, Grid] = field(default_factory=dict)
+
+    @cached_property
+    def first(self) -> dict[str, float]:
+        """The first value of each output, that of the signal before it where not measured."""
+        found, fallback = {}, float(self.u[0])
+        for name in OUTPUTS:
+            if name in self.measured:
+                fallback = float(np.nanmedian(self.measured[name][:3]))
+            found[name] = fallback
+        return found
 
     def grid(self, phase: float, drive: tuple[str, ...]) -> Grid:
         """Return the stretch with the commands moved by a share of a period.
@@ -166,7 +177,11 @@ class Bench:
         coarse : float
             Take steps of up to this length [s] even where the effects ask for shorter ones.
         """
-        return self._run(values, effects, drive, coarse, 'x', math.inf)[0]
+        results = []
+        for index in range(len(self.stretches)):
+            outputs, grid, _ = self._run(index, values, effects, drive, coarse, 'x', math.inf)
+            results.append(outputs[:, grid.rows])
+        return results
 
     def score(
         self,
@@ -178,54 +193,51 @@ class Bench:
         bound: float = math.inf,
     ) -> float:
         """Return the robust sum of squares of a signal over its noise, or more than `bound`."""
-        return self._run(values, effects, drive, coarse, signal, bound)[1]
+        score = 0.0
+        for index in range(len(self.stretches)):
+            if score <= bound:
+                left = bound - score
+                score += self._run(index, values, effects, drive, coarse, signal, left)[2]
+        return score
 
     def _run(
         self,
+        index: int,
         values: Mapping[str, float],
         effects: Sequence[str],
         drive: Sequence[str],
         coarse: float,
         signal: str,
         bound: float,
-    ) -> tuple[list[Array], float]:
+    ) -> tuple[Array, Grid, float]:
+        """Run one stretch; return outputs on its grid, the grid, and the score of a signal."""
         composition = compose(effects, values)
         theta = np.array([*(values[name] for name in THETA), DELTA.default, 0.0])
-        results, score = [], 0.0
-        for index, stretch in enumerate(self.stretches):
-            grid = stretch.grid(values.get('phase', 0.0), tuple(drive))
-            outputs = np.empty((3, grid.u.size))
-            score += scored()(
-                grid.u,
-                grid.dt,
-                self.start(index, values),
-                theta,
-                max(composition.finest, coarse),
-                composition.effects,
-                np.zeros(composition.memory_size),
-                grid.forced,
-                outputs,
-                OUTPUTS.index(signal),
-                grid.targets.get(signal, grid.nothing),
-                grid.scales.get(signal, grid.nothing),
-                bound - score,
-            )
-            results.append(outputs[:, grid.rows])
-            if score > bound:
-                break
-        return results, score
+        grid = self.stretches[index].grid(values.get('phase', 0.0), tuple(drive))
+        outputs = np.empty((3, grid.u.size))
+        score = scored()(
+            grid.u,
+            grid.dt,
+            self.start(index, values),
+            theta,
+            max(composition.finest, coarse),
+            composition.effects,
+            np.zeros(composition.memory_size),
+            grid.forced,
+            outputs,
+            OUTPUTS.index(signal),
+            grid.targets.get(signal, grid.nothing),
+            grid.scales.get(signal, grid.nothing),
+            bound,
+        )
+        return outputs, grid, score
 
-    def start(self, index: int, values: Mapping[str, float]) -> Any:
-        """Return the state before a stretch: as fitted, else as measured."""
+    def start(self, index: int, values: Mapping[str, float]) -> Array:
+        """Return the state before a stretch: as fitted, else as first measured."""
         suffix = f'.{index}' if index else ''
-        stretch = self.stretches[index]
-        found, fallback = {}, stretch.u[0]
-        for name in OUTPUTS:
-            if name in stretch.measured:
-                fallback = float(np.nanmedian(stretch.measured[name][:3]))
-            found[name] = values.get(f'{name}_0{suffix}', fallback)
-        p1, p2, x = found.values()
-        return np.array(State(p1, p2, x, 0.0, 0.0, 0.0, play=p1, command=p1, time=0.0))
+        first = self.stretches[index].first
+        p1, p2, x = (values.get(f'{name}_0{suffix}', first[name]) for name in OUTPUTS)
+        return np.array([p1, p2, x, 0.0, 0.0, 0.0, p1, p1, 0.0])
 
     def residual(self, results: Sequence[Array], name: str) -> Array:
         """Return measured minus model of a signal over its noise, NaN where not counted."""

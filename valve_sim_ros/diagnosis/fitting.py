@@ -310,6 +310,6 @@ def starting_valve(bench: Bench) -> Valve:
     values = dict(START)
     for index in range(len(bench.stretches)):
         suffix = f'.{index}' if index else ''
-        p1, p2, x = bench.start(index, values)[:3]
+        p1, p2, x = (float(v) for v in bench.start(index, values)[:3])
         values |= {f'p1_0{suffix}': p1, f'p2_0{suffix}': p2, f'x_0{suffix}': x}
     return Valve(values)
