@@ -107,7 +107,7 @@ def _eta(
     for name in problem.signals:
         measured = [stretch.measured[name].copy() for stretch in problem.stretches]
         for values, count in zip(measured, counts or (), strict=False):
-            values[~count] = np.nan
+            values[np.logical_not(count)] = np.nan
         fitted = [output[OUTPUTS.index(name)] for output in outputs]
         etas[name] = fitness(np.concatenate(measured), np.concatenate(fitted))
     return etas
@@ -119,7 +119,7 @@ def _eta_inside_outside(rest: Problem, point: Array) -> dict[str, dict[str, floa
     used = [np.any([w > 0 for w in weights.values()], axis=0) for weights in rest.weights]
     return {
         'fitted': _eta(rest, outputs, used),
-        'held_out': _eta(rest, outputs, [~mask for mask in used]),
+        'held_out': _eta(rest, outputs, [np.logical_not(mask) for mask in used]),
     }
 
 
