@@ -13,6 +13,8 @@ from .stretches import Mask
 
 MOST_LAGS = 30
 """Longest memory of the autoregressive model of the residuals [samples]."""
+LEAST_FREEDOM = 0.25
+"""Least share of the independent samples that the fit is taken to leave free."""
 
 
 def scatter(problem: Problem, jacobian: Array, residuals: Array) -> Array:
@@ -20,16 +22,22 @@ def scatter(problem: Problem, jacobian: Array, residuals: Array) -> Array:
 
     Omega is that of an autoregressive process fitted to each signal's residuals (Yule-Walker,
     order by Akaike's criterion): noise that is white gives the usual sum, noise that is not gives
-    the scatter that least squares really have (the middle of the sandwich formula).
+    the scatter that least squares really have (the middle of the sandwich formula). What the fit
+    has taken out of the residuals is put back by the degrees of freedom, counted in samples that
+    are as good as independent.
     """
-    result = np.zeros((jacobian.shape[1],) * 2)
+    size = jacobian.shape[1]
+    result, independent = np.zeros((size, size)), 0.0
     for name in problem.signals:
         parts = [part for signal, part in problem.blocks if signal == name]
         counts = [stretch[name] for stretch in problem.counts]
-        coefficients, variance = _autoregression(_covariances(residuals, parts, counts))
+        found = _covariances(residuals, parts, counts)
+        coefficients, variance = _autoregression(found)
+        longest = variance / float(coefficients.sum()) ** 2
+        independent += found[0] * min(float(found[1]) / max(longest, 1e-12), 1.0)
         for part in parts:
             result += _weighted(jacobian[part], coefficients, variance)
-    return result
+    return result / max(1.0 - size / max(independent, 1.0), LEAST_FREEDOM)
 
 
 def _covariances(residuals: Array, parts: Sequence[slice], counts: Sequence[Mask]) -> Array:

@@ -16,7 +16,8 @@ PRIOR = 12.0
 """Information of knowing only the legal range: one over the variance of a uniform share."""
 LEAST_VARIANCE = 0.05
 """Least variance of the residuals over that of the noise assumed: clean simulations have none."""
-LEAST_STEP, MOST_STEP = 1e-6, 2e-2
+LEAST_STEP, MOST_STEP = 1e-6, 5e-2
+ROUNDS = 3
 GRADIENT_STEP = 1e-6
 
 
@@ -93,11 +94,27 @@ def covariance(problem: Problem, point: Array) -> Covariance:
     own = PRIOR * np.eye(point.size)
     jacobian = problem.jacobian(point, residuals, STEP)
     bread = np.linalg.inv(jacobian.T @ jacobian / variance + own)
-    steps = np.clip(np.sqrt(np.diag(bread)), LEAST_STEP, MOST_STEP)
-    jacobian = problem.jacobian(point, residuals, steps)
-    jacobian += problem.jacobian(point, residuals, -steps)
-    jacobian *= 0.5
-    information = jacobian.T @ jacobian / variance
-    bread = np.linalg.inv(information + own)
+    for _ in range(ROUNDS):
+        jacobian = _secants(problem, point, bread)
+        information = jacobian.T @ jacobian / variance
+        bread = np.linalg.inv(information + own)
     middle = scatter(problem, jacobian, residuals) / variance**2 + own
     return Covariance(problem, point, bread @ middle @ bread, bread, np.diag(information) < 1.0)
+
+
+def _secants(problem: Problem, point: Array, matrix: Array) -> Array:
+    """Return the derivatives of the residuals over one standard error each way, shape (m, size).
+
+    The steps go along the axes of the ellipsoid of scatter: far along the ridges of the cost,
+    little across them.
+    """
+    sizes, axes = np.linalg.eigh(matrix)
+    steps = axes * np.sqrt(np.maximum(sizes, LEAST_STEP**2))
+    steps *= np.minimum(1.0, MOST_STEP / np.abs(steps).max(axis=0))
+    changes = np.empty((problem.residuals(point).size, point.size))
+    moves = np.empty_like(steps)
+    for index, step in enumerate(steps.T):
+        ahead, behind = np.clip(point + step, 0.0, 1.0), np.clip(point - step, 0.0, 1.0)
+        moves[:, index] = ahead - behind
+        changes[:, index] = problem.residuals(ahead) - problem.residuals(behind)
+    return np.asarray(changes @ np.linalg.inv(moves))

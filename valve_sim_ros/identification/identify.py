@@ -3,7 +3,6 @@
 """From recordings to a fitted valve."""
 
 from collections.abc import Mapping, Sequence
-from datetime import datetime, timezone
 import os
 
 import numpy as np
@@ -22,7 +21,7 @@ from .result import Identification
 from .search import polish, search
 from .stretches import Mask
 from .uncertainty import assess, Assessment, WEAK
-from .watch import Progress, Stop, Watch
+from .watch import Progress, Watch
 
 FEWEST_SAMPLES = 10
 SHARES = {'search': 0.7, 'ridge': 0.75, 'hold-out': 0.9, 'profiles': 1.0}
@@ -44,6 +43,7 @@ def identify(
     hold_out: bool | str = True,
     profiles: bool = False,
     progress: Progress | None = None,
+    interruptible: bool = False,
 ) -> Identification:
     """Fit the base valve's seven parameters to all measured signals, weighted by their noise.
 
@@ -68,6 +68,8 @@ def identify(
     progress : callable, optional
         Called with the share done, 0 to 1, and what is being done. If it raises `watch.Stop`,
         the best so far is the result, marked partial.
+    interruptible : bool
+        Let Ctrl-C (KeyboardInterrupt) do the same.
 
     Returns
     -------
@@ -87,7 +89,7 @@ def identify(
     problem = Problem(recordings, branch, signals=signals)
     parts = parts_of(problem, way)
     problem.residuals(problem.middle())  # loads the machine code before the search
-    watch = Watch(progress)
+    watch = Watch(progress, interruptible)
     fitted, assessment, partial = _fit(problem, seed, watch)
     hold_outs: list[HoldOut] = []
     found: list[Profile] = []
@@ -102,7 +104,7 @@ def identify(
             share = SHARES['hold-out'] + width * (number + 1) / len(assessment.names)
             watch.phase(share, f'profile of {name}')
             found.append(profile(fitted, name, assessment.estimates[name], watch))
-    except Stop:
+    except watch.stops:
         partial = True
     outputs = fitted.problem.simulate(fitted.point)
     watch.done(partial)
@@ -115,9 +117,8 @@ def identify(
         fitted=_by_recording(recordings, outputs),
         seed=seed,
         version=__version__,
-        date=datetime.now(timezone.utc).isoformat(timespec='seconds'),
         assessment=assessment,
-        remarks=tuple(remarks(hold_outs, assessment.estimates)),
+        remarks=tuple(remarks(hold_outs, assessment.estimates, _misfit(fitted))),
         profiles=tuple(found),
         noise=dict(problem.noise),
         bounds={u.name: (u.lower, u.upper) for u in fitted.problem.unknowns.each},
@@ -148,10 +149,10 @@ def _fit(problem: Problem, seed: int, watch: Watch) -> tuple[Covariance, Assessm
     Returns the scatter around the optimum of the problem in which a_1 is free, its assessment,
     and whether the search was stopped.
     """
-    watch.phase(SHARES['search'], 'searching')
     free = problem.with_free_a_1()
     point, partial = None, False
     try:
+        watch.phase(SHARES['search'], 'searching')
         point = search(problem, seed, watch).point
         watch.phase(SHARES['ridge'], 'telling a_1 from a_2')
         released = polish(free, problem.with_a_1(point), watch).point
@@ -161,7 +162,7 @@ def _fit(problem: Problem, seed: int, watch: Watch) -> tuple[Covariance, Assessm
         if a_1.half_width <= WEAK * a_1.value:
             return scatter, assessment, partial
         point = _settled(problem, point, scatter.unseen)
-    except Stop:
+    except watch.stops:
         partial = True
         if point is None:
             if watch.best is None:
@@ -171,6 +172,12 @@ def _fit(problem: Problem, seed: int, watch: Watch) -> tuple[Covariance, Assessm
             point = watch.best.point
     scatter = covariance(free, problem.with_a_1(point))
     return scatter, assess(scatter, a_1_held=True), partial
+
+
+def _misfit(fitted: Covariance) -> float:
+    """Return the root mean square of the residuals over the noise."""
+    residuals = fitted.problem.residuals(fitted.point)
+    return float(np.sqrt(residuals @ residuals / max(int(np.count_nonzero(residuals)), 1)))
 
 
 def _settled(problem: Problem, point: Array, unseen: Mask) -> Array:

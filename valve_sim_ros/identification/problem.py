@@ -187,6 +187,16 @@ class Problem:
         other._flatten()
         return other
 
+    def with_starts(self, point: Array, other: Array, masks: Sequence[Mask]) -> Array:
+        """Return `point` with the starting states of `other` where a stretch starts masked."""
+        result = point.copy()
+        width = len(self._kinds)
+        for place, index in enumerate(self._started):
+            if masks[index][0]:
+                first = len(self.unknowns) + place * width
+                result[first : first + width] = other[first : first + width]
+        return result
+
     def _flatten(self) -> None:
         """Lay measurements and weights out in the order of the residuals."""
         self.blocks: list[tuple[str, slice]] = []

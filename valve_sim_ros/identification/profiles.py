@@ -21,6 +21,8 @@ STRIDE = 0.5
 """Standard errors from one point of the profile to the next, growing by `GROWTH`."""
 GROWTH = 1.35
 MOST_POINTS = 16
+STAGES = ((4, 1e-3), (1, STEP))
+"""Width of the blur and step of the derivatives of each descent."""
 STEEP, SHORTEST = 4.0, 0.1
 BEYOND = 2.0
 """A profile ends where the rise is this multiple of the 95 % point."""
@@ -135,7 +137,7 @@ class _Walker:
     def held(self, place: float, start: Array) -> End:
         """Return the best point whose held unknown is at `place`, near `start`."""
         task = _Held(self._problem, self._index, place, start, self.is_f_d)
-        end = polish(task, np.clip(start[task.others], 0.0, 1.0), self._watch)
+        end = polish(task, np.clip(start[task.others], 0.0, 1.0), self._watch, STAGES)
         return End(task.whole(end.point), end.residuals, end.cost)
 
 

@@ -4,6 +4,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from datetime import datetime, timezone
 import json
 import math
 import os
@@ -44,8 +45,6 @@ class Identification:
         Seed of the search.
     version : str
         Version of this package.
-    date : str
-        When it was fitted, ISO 8601.
     assessment : Assessment or None
         Correlations and visible combinations.
     remarks : tuple of str
@@ -68,7 +67,6 @@ class Identification:
     fitted: tuple[Mapping[str, Array], ...]
     seed: int
     version: str
-    date: str = ''
     assessment: Assessment | None = None
     remarks: tuple[str, ...] = ()
     profiles: tuple[Profile, ...] = ()
@@ -133,7 +131,6 @@ class Identification:
             'signals': list(self.signals),
             'seed': self.seed,
             'version': self.version,
-            'date': self.date,
             'data': {'recordings': [_recording(recording) for recording in self.recordings]},
         }
 
@@ -141,9 +138,11 @@ class Identification:
         """Write `fitted.yaml` and `identify.json`, each aside first and then renamed."""
         folder = Path(directory)
         folder.mkdir(parents=True, exist_ok=True)
+        date = datetime.now(timezone.utc).isoformat(timespec='seconds')
+        content = {**self.as_json(), 'date': date}
         aside = folder / '.identify.json.part'
-        aside.write_text(json.dumps(self.as_json(), indent=2, allow_nan=False), encoding='utf-8')
-        write_parameters(folder / 'fitted.yaml', self.spec, comments(self))
+        aside.write_text(json.dumps(content, indent=2, allow_nan=False), encoding='utf-8')
+        write_parameters(folder / 'fitted.yaml', self.spec, comments(self, date))
         os.replace(aside, folder / 'identify.json')
 
 

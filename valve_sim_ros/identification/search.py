@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """The search: starts from the physics and from everywhere, a race of the best, then a polish."""
 
+from collections.abc import Sequence
+
 import numpy as np
 from scipy.stats import qmc
 
@@ -68,11 +70,16 @@ def search(problem: Problem, seed: int = 0, watch: Watch | None = None) -> End:
     return best
 
 
-def polish(problem: Task, point: Array, watch: Watch | None = None) -> End:
+def polish(
+    problem: Task,
+    point: Array,
+    watch: Watch | None = None,
+    stages: Sequence[tuple[int, float]] = POLISH,
+) -> End:
     """Go down from `point` with steps of falling size; return the best end on the sharp cost."""
     watch = watch or Watch()
     ends = []
-    for width, step in POLISH:
+    for width, step in stages:
         end = View(problem, watch, width).descend(point, MOST_STEPS, step)
         point = end.point
         if width == 1:

@@ -42,7 +42,7 @@ def eta_lines(result: 'Identification') -> list[str]:
     return text
 
 
-def comments(result: 'Identification') -> list[str]:
+def comments(result: 'Identification', date: str) -> list[str]:
     """Return the head of fitted.yaml: from what, by what, how well."""
     digests = [
         f'data: {path} sha256 {digest}'
@@ -54,7 +54,7 @@ def comments(result: 'Identification') -> list[str]:
         for name, (low, high) in result.bounds.items()
     ]
     return [
-        f'Fitted by valve_sim_ros {result.version}, seed {result.seed}, {result.date}',
+        f'Fitted by valve_sim_ros {result.version}, seed {result.seed}, {date}',
         *digests,
         *([f'searched: {", ".join(ranges)}'] if ranges else []),
         *result.lines(),

@@ -118,9 +118,8 @@ def assess(covariance: Covariance, a_1_held: bool) -> Assessment:
     ratio = estimates[RATIO]
     for name in ('a_1', 'a_2') if a_1_held else ():
         words = (
-            f'not separately identified by this data: a_1 is held at '
-            f'{estimates["a_1"].value:g} 1/s^2, only a_1/a_2 = {ratio.value:.3g} 1/s is fitted '
-            f'({ratio.verdict})'
+            f'not separately identified by this data, only a_1/a_2 = {ratio.value:.3g} 1/s is '
+            f'fitted; a_1 is held at {estimates["a_1"].value:g}'
         )
         estimates[name] = replace(estimates[name], verdict=words)
     names = tuple(n for n in unknowns.names if n != 'a_1' or not a_1_held)

@@ -29,11 +29,16 @@ class Watch:
     ----------
     best : End or None
         The best point that was offered: what is left if the search is stopped.
+    stops : tuple of type
+        The exceptions that end a search and keep its best.
     """
 
-    def __init__(self, progress: Progress | None = None) -> None:
-        """Start at nothing done."""
+    def __init__(self, progress: Progress | None = None, interruptible: bool = False) -> None:
+        """Start at nothing done; if `interruptible`, Ctrl-C stops like a progress callback."""
         self.best: End | None = None
+        self.stops: tuple[type[BaseException], ...] = (Stop,)
+        if interruptible:
+            self.stops += (KeyboardInterrupt,)
         self.progress = progress
         self._told = -BETWEEN
         self._share, self._target, self._text = 0.0, 0.0, ''
