@@ -38,7 +38,8 @@ unexport NUMBA_DISABLE_JIT
 ISOLATED = logs=$$(mktemp -d) && trap 'rm -rf "$$logs"' EXIT && export ROS_LOG_DIR=$$logs \
 	ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST ROS_DOMAIN_ID=$$(( $$$$ % 101 + 1 )) &&
 
-.PHONY: help demo test lint format bench blind blind-tuning lower-bounds colcon lock clean check-python
+.PHONY: help demo test lint format bench blind blind-tuning starts coverage lower-bounds colcon
+.PHONY: lock clean check-python
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
 
@@ -72,6 +73,12 @@ blind: $(VENV)/.ready  ## diagnose hidden effects on blind records (hours); tabl
 
 blind-tuning: $(VENV)/.ready  ## the same on the half that thresholds may be set on, no table
 	@$(BIN)/python -m blind study --split tuning $(BLIND_ARGS)
+
+starts: $(VENV)/.ready  ## does the search find the optimum of 100 random valves?
+	@$(BIN)/python studies/random_valves.py
+
+coverage: $(VENV)/.ready  ## do 95 % intervals hold the truth 95 times in 100? (200 runs)
+	@$(BIN)/python studies/interval_coverage.py
 
 lower-bounds: $(LOWER)/.ready  ## the fast tests on the oldest supported libraries
 	@$(CURDIR)/$(LOWER)/bin/python -m pytest -m 'not slow' --ignore=test/test_packaging.py $(PYTEST_ARGS)

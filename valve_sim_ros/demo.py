@@ -10,6 +10,7 @@ import argparse
 from pathlib import Path
 import shutil
 import sys
+from typing import Any
 
 import numpy as np
 import rclpy
@@ -95,7 +96,9 @@ def record(folder: Path) -> Path:
     }
     clean = align(arrivals, Provenance(time_source='received'))
     noise = np.random.default_rng(0)
-    noisy = {n: clean.output(n) + NOISE * noise.standard_normal(len(clean)) for n in clean.signals}
+    noisy: dict[str, Any] = {
+        n: clean.output(n) + NOISE * noise.standard_normal(len(clean)) for n in clean.signals
+    }
     bag = folder / 'bag'
     write_bag(Recording(clean.time, clean.u, **noisy, provenance=clean.provenance), bag)
     return bag

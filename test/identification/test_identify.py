@@ -40,7 +40,9 @@ def test_finds_the_truth(noise, eta, signals):
     assert result.eta >= eta
     for name, true in TRUTH.items():
         assert result.spec.values[name] == pytest.approx(true, rel=0.02), name
-    assert 'not separately' in result.estimates['a_1'].verdict
+    estimate = result.estimates['a_1']
+    assert estimate.identified == (noise == 0.0)
+    assert ('not separately' in estimate.verdict) == (noise > 0.0)
 
 
 def test_same_seed_same_result():

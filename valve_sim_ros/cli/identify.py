@@ -3,28 +3,54 @@
 """`valve_sim identify`: recordings in, fitted parameters out."""
 
 from pathlib import Path
+import sys
 
 import click
 
+from ..identification.holdout import WAYS
+from ..recordings.recording import OUTPUTS
 from .options import progress_bar, topic_option, topics_by_signal
+
+INTERRUPTED = 130
+"""Exit code of what Ctrl-C has ended."""
 
 
 @click.command('identify')
 @click.argument('data', nargs=-1, required=True, type=click.Path(path_type=Path))
 @click.option('--out', required=True, type=click.Path(path_type=Path), help='Folder for results.')
 @topic_option
+@click.option(
+    '--signal',
+    'signals',
+    multiple=True,
+    type=click.Choice(OUTPUTS),
+    help='Output to fit; repeatable; all that are measured by default.',
+)
 @click.option('--seed', default=0, show_default=True, help='Seed of the global search.')
-@click.option('--hold-out/--no-hold-out', default=True, help='Also fit without the outer thirds.')
-@click.option('--plot/--no-plot', default=True, help='Draw OUT/fit.png.')
+@click.option(
+    '--hold-out',
+    type=click.Choice(WAYS),
+    default='auto',
+    show_default=True,
+    help='Also fit without the outer thirds of the time, or without each bag; auto: by bag if '
+    'there are several.',
+)
+@click.option('--profiles', is_flag=True, help='Also the profile likelihood of each parameter.')
+@click.option('--plot/--no-plot', default=True, help='Draw OUT/fit.png and OUT/report.html.')
 def identify_command(
     data: tuple[Path, ...],
     out: Path,
     topics: tuple[str, ...],
+    signals: tuple[str, ...],
     seed: int,
-    hold_out: bool,
+    hold_out: str,
+    profiles: bool,
     plot: bool,
 ) -> None:
-    """Fit the valve to DATA (bags or CSV files); write OUT/fitted.yaml and OUT/identify.json."""
+    """Fit the valve to DATA (bags or CSV files); write fitted.yaml, identify.json, report.html.
+
+    Ctrl-C ends the search and keeps the best so far, marked as partial (exit code 130).
+    """
     from ..identification.identify import identify
 
     with progress_bar() as progress:
@@ -32,8 +58,11 @@ def identify_command(
             data,
             topics=topics_by_signal(topics),
             seed=seed,
+            signals=signals or None,
             hold_out=hold_out,
+            profiles=profiles,
             progress=progress,
+            interruptible=True,
         )
     for recording in result.recordings:
         for line in recording.quality.lines():
@@ -41,8 +70,14 @@ def identify_command(
     for line in result.lines():
         click.echo(line)
     result.write(out)
+    written = ['fitted.yaml', 'identify.json']
     if plot:
+        from ..report.identification import write_report
         from ..report.plots import draw_fit
 
         draw_fit(result, out / 'fit.png')
-    click.echo(f'written: {out / "fitted.yaml"}, {out / "identify.json"}')
+        write_report(result, out / 'report.html')
+        written += ['fit.png', 'report.html']
+    click.echo('written: ' + ', '.join(str(out / name) for name in written))
+    if result.partial:
+        sys.exit(INTERRUPTED)

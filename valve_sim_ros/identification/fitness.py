@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """How well a fitted signal matches a measured one."""
 
+import math
+
 import numpy as np
 
 from ..model.pipeline import Array
@@ -28,7 +30,10 @@ def fitness(measured: Array, fitted: Array) -> float:
     return 100.0 * (1.0 - float(np.sum((x - estimate) ** 2)) / spread) if spread else float('nan')
 
 
-def nrmse_fit(measured: Array, fitted: Array) -> float:
-    """Return 100 (1 - |x - xhat| / |x - mean(x)|), the fit of system identification tools."""
-    eta = fitness(measured, fitted)
-    return 100.0 * (1.0 - float(np.sqrt(1.0 - eta / 100.0)))
+def nrmse_fit(eta: float) -> float:
+    """Return 100 (1 - |x - xhat| / |x - mean(x)|), the fit of system identification tools [%].
+
+    It follows from `eta`, the same with squared norms.
+    """
+    missing = 1.0 - eta / 100.0
+    return 100.0 * (1.0 - math.sqrt(missing)) if missing >= 0.0 else math.nan

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """From recordings to a fitted valve."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 import os
 
 import numpy as np
@@ -11,15 +11,24 @@ from ..model.parameters import BRANCH
 from ..model.pipeline import Array
 from ..recordings import read_recording
 from ..recordings.recording import OUTPUTS, Recording
+from .covariance import Covariance, covariance
 from .errors import IdentificationError
-from .fitness import fitness
+from .holdout import etas, HoldOut, parts_of, remarks
+from .holdout import hold_out as fit_without
 from .problem import Problem
+from .profiles import Profile, profile
 from .result import Identification
 from .search import polish, search
-from .uncertainty import assess
+from .stretches import Mask
+from .uncertainty import assess, Assessment, WEAK
+from .watch import Progress, Watch
 
-THIRDS = {'first third': (0.0, 1.0 / 3.0), 'last third': (2.0 / 3.0, 1.0)}
 FEWEST_SAMPLES = 10
+SHARES = {'search': 0.7, 'ridge': 0.75, 'hold-out': 0.9, 'profiles': 1.0}
+"""Share of the work that is done after each phase."""
+
+SAME = 0.1
+"""Loss of log-likelihood, doubled, that an unseen parameter's usual value may cost."""
 
 Source = Recording | str | os.PathLike[str]
 
@@ -30,10 +39,13 @@ def identify(
     topics: Mapping[str, str] | None = None,
     seed: int = 0,
     branch: str = BRANCH.default,
-    hold_out: bool = True,
-    progress: Callable[[float, str], None] | None = None,
+    signals: Sequence[str] | None = None,
+    hold_out: bool | str = True,
+    profiles: bool = False,
+    progress: Progress | None = None,
+    interruptible: bool = False,
 ) -> Identification:
-    """Fit the base valve's seven parameters by maximising eta, eq. (11).
+    """Fit the base valve's seven parameters to all measured signals, weighted by their noise.
 
     Parameters
     ----------
@@ -46,11 +58,18 @@ def identify(
         Seed of the global search; the same seed gives the same result.
     branch : {'zoh', 'printed'}
         Form of the condition of eq. (5).
-    hold_out : bool
-        Also fit without the first and without the last third, starting where the whole data
-        led, and report eta there.
+    signals : sequence of str, optional
+        Outputs to fit; all that are measured by default.
+    hold_out : bool or {'auto', 'time', 'bags', 'none'}
+        Also fit without part of the data, starting where the whole data led, and report eta
+        there: without the first and the last third of the time, or without each recording.
+    profiles : bool
+        Also work out the profile likelihood of every parameter.
     progress : callable, optional
-        Called with the share done, 0 to 1, and what is being done.
+        Called with the share done, 0 to 1, and what is being done. If it raises `watch.Stop`,
+        the best so far is the result, marked partial.
+    interruptible : bool
+        Let Ctrl-C (KeyboardInterrupt) do the same.
 
     Returns
     -------
@@ -65,6 +84,52 @@ def identify(
     """
     from .. import __version__
 
+    way = hold_out if isinstance(hold_out, str) else 'auto' if hold_out else 'none'
+    recordings = _read(data, topics)
+    problem = Problem(recordings, branch, signals=signals)
+    parts = parts_of(problem, way)
+    problem.residuals(problem.middle())  # loads the machine code before the search
+    watch = Watch(progress, interruptible)
+    fitted, assessment, partial = _fit(problem, seed, watch)
+    hold_outs: list[HoldOut] = []
+    found: list[Profile] = []
+    try:
+        for number, (name, masks) in enumerate(parts.items() if not partial else ()):
+            width = SHARES['hold-out'] - SHARES['ridge']
+            watch.phase(SHARES['ridge'] + width * (number + 1) / len(parts), f'without {name}')
+            point = fitted.point
+            hold_outs.append(fit_without(fitted.problem, point, name, masks, watch))
+        for number, name in enumerate(assessment.names if profiles and not partial else ()):
+            width = SHARES['profiles'] - SHARES['hold-out']
+            share = SHARES['hold-out'] + width * (number + 1) / len(assessment.names)
+            watch.phase(share, f'profile of {name}')
+            found.append(profile(fitted, name, assessment.estimates[name], watch))
+    except watch.stops:
+        partial = True
+    outputs = fitted.problem.simulate(fitted.point)
+    watch.done(partial)
+    return Identification(
+        spec=fitted.problem.spec(fitted.point),
+        estimates=assessment.estimates,
+        eta_by_signal=etas(fitted.problem, outputs),
+        eta_held_out={each.name: each.eta for each in hold_outs},
+        recordings=recordings,
+        fitted=_by_recording(recordings, outputs),
+        seed=seed,
+        version=__version__,
+        assessment=assessment,
+        remarks=tuple(remarks(hold_outs, assessment.estimates, _misfit(fitted))),
+        profiles=tuple(found),
+        noise=dict(problem.noise),
+        bounds={u.name: (u.lower, u.upper) for u in fitted.problem.unknowns.each},
+        partial=partial,
+    )
+
+
+def _read(
+    data: Source | Sequence[Source], topics: Mapping[str, str] | None
+) -> tuple[Recording, ...]:
+    """Read what is not read yet; refuse what is too short."""
     sources = [data] if isinstance(data, (Recording, str, os.PathLike)) else list(data)
     recordings = tuple(
         source if isinstance(source, Recording) else read_recording(source, topics)
@@ -75,52 +140,59 @@ def identify(
         raise IdentificationError(
             f'the data has {samples} samples: expected at least {FEWEST_SAMPLES}; record longer'
         )
-    report = progress or (lambda share, text: None)
-    problem = Problem(recordings, branch)
-    problem.simulate(np.full(problem.size, 0.5))  # loads the machine code before the search
-    point, jacobian = search(problem, seed, lambda share, text: report(0.8 * share, text))
-    held_out = {}
-    for number, (name, (start, stop)) in enumerate(THIRDS.items() if hold_out else ()):
-        report(0.8 + 0.1 * number, f'{name} held out')
-        rest = problem.withheld(start, stop)
-        without, _ = polish(rest, point)
-        held_out[name] = _eta_inside_outside(rest, without)
-    report(1.0, 'done')
-    outputs = problem.simulate(point)
-    return Identification(
-        spec=problem.spec(point),
-        estimates=assess(problem, point, jacobian),
-        eta_by_signal=_eta(problem, outputs),
-        eta_held_out=held_out,
-        recordings=recordings,
-        fitted=_by_recording(recordings, outputs),
-        seed=seed,
-        version=__version__,
-    )
+    return recordings
 
 
-def _eta(
-    problem: Problem, outputs: list[Array], counts: list[Array] | None = None
-) -> dict[str, float]:
-    """Return eta by signal over the samples that count."""
-    etas = {}
-    for name in problem.signals:
-        measured = [stretch.measured[name].copy() for stretch in problem.stretches]
-        for values, count in zip(measured, counts or (), strict=False):
-            values[~count] = np.nan
-        fitted = [output[OUTPUTS.index(name)] for output in outputs]
-        etas[name] = fitness(np.concatenate(measured), np.concatenate(fitted))
-    return etas
+def _fit(problem: Problem, seed: int, watch: Watch) -> tuple[Covariance, Assessment, bool]:
+    """Search with a_1 held, then see whether the data can tell a_1 from a_2.
+
+    Returns the scatter around the optimum of the problem in which a_1 is free, its assessment,
+    and whether the search was stopped.
+    """
+    free = problem.with_free_a_1()
+    point, partial = None, False
+    try:
+        watch.phase(SHARES['search'], 'searching')
+        point = search(problem, seed, watch).point
+        watch.phase(SHARES['ridge'], 'telling a_1 from a_2')
+        released = polish(free, problem.with_a_1(point), watch).point
+        scatter = covariance(free, released)
+        assessment = assess(scatter, a_1_held=False)
+        a_1 = assessment.estimates['a_1']
+        if a_1.half_width <= WEAK * a_1.value:
+            return scatter, assessment, partial
+        point = _settled(problem, point, scatter.unseen)
+    except watch.stops:
+        partial = True
+        if point is None:
+            if watch.best is None:
+                raise IdentificationError(
+                    'stopped before anything was found; let it run a little longer'
+                ) from None
+            point = watch.best.point
+    scatter = covariance(free, problem.with_a_1(point))
+    return scatter, assess(scatter, a_1_held=True), partial
 
 
-def _eta_inside_outside(rest: Problem, point: Array) -> dict[str, dict[str, float]]:
-    """Return eta on the data that was fitted and on that which was withheld."""
-    outputs = rest.simulate(point)
-    used = [np.any([w > 0 for w in weights.values()], axis=0) for weights in rest.weights]
-    return {
-        'fitted': _eta(rest, outputs, used),
-        'held_out': _eta(rest, outputs, [~mask for mask in used]),
-    }
+def _misfit(fitted: Covariance) -> float:
+    """Return the root mean square of the residuals over the noise."""
+    residuals = fitted.problem.residuals(fitted.point)
+    return float(np.sqrt(residuals @ residuals / max(int(np.count_nonzero(residuals)), 1)))
+
+
+def _settled(problem: Problem, point: Array, unseen: Mask) -> Array:
+    """Put unknowns that the data do not see back to their usual values."""
+    usual = problem.point({})
+    residuals = problem.residuals(point)
+    cost = float(residuals @ residuals)
+    limit = cost * (1.0 + SAME / max(int(np.count_nonzero(residuals)), 1))
+    for index in np.flatnonzero(unseen[: len(problem.unknowns)]):
+        moved = point.copy()
+        moved[index] = usual[index]
+        residuals = problem.residuals(moved)
+        if float(residuals @ residuals) <= limit:
+            point = moved
+    return point
 
 
 def _by_recording(

@@ -1,201 +1,268 @@
 # Copyright 2026 The valve_sim_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The fit as a function: a vector of unknowns in, weighted residuals out."""
+"""The fit as a function: a point of the unit cube in, weighted residuals out."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
-import math
+from collections.abc import Mapping, Sequence
+import copy
 
 import numpy as np
 
-from ..model import pipeline
-from ..model.kernels import make
-from ..model.parameters import BASE
+from ..model.parameters import BASE, BRANCH
 from ..model.pipeline import Array
-from ..model.simulation import InitialState, NO_EFFECTS
+from ..model.simulation import drive, InitialState, machine
 from ..model.spec import ValveSpec
 from ..recordings.recording import OUTPUTS, Recording
 from .errors import IdentificationError
+from .stretches import Mask, noise_of, refuse_flat, Stretch, stretches_of
+from .unknowns import A_1_HELD, valve_unknowns
 
-DECLARED = {parameter.name: parameter for parameter in BASE}
-A_1_HELD = DECLARED['a_1'].default
-RATIO_BOUNDS = (0.05, 0.5 * math.sqrt(A_1_HELD))
-"""a_1/a_2 [1/s], from a very slow stem to the critically damped one at the held a_1."""
-UNKNOWNS = ('f_d1', 'T_g1', 'T_g2', 'f_s', 'f_d', 'a_1/a_2')
-STAGE = {'p1': ('f_d1',), 'p2': ('T_g1', 'T_g2'), 'x': ('f_s', 'f_d')}
-"""Which unknowns each stage adds on the way to a signal; a_1/a_2 is left to the polish."""
-MOST_STARTS = 3
-"""Up to so many segments, unknown starting pressures are fitted too."""
-
-
-@dataclass(frozen=True)
-class Stretch:
-    """A run of samples without a gap, ready for the compiled model."""
-
-    u: Array
-    dt: Array
-    measured: dict[str, Array]
+MOST_STARTS = 20
+"""So many stretches, the longest, have their starting states fitted; it costs memory for each."""
+STEP = 1e-4
+"""Step of numerical derivatives, as a share of an unknown's range."""
 
 
 class Problem:
-    """Weighted residuals of the base valve over all segments of all recordings.
+    """Weighted residuals of a valve over all stretches of all recordings.
 
-    The unknowns are walked in the unit cube: logarithmic where the declaration says so, f_d as a
-    share of f_s, a_1 and a_2 through their ratio, and per segment the starting p1 as a share of
-    the backlash and the starting p2 - x as a share of f_s, unless measured.
+    A point of the unit cube holds the unknowns of `unknowns.valve_unknowns` and then, for each
+    stretch that has one, its starting p1, p2 and x: 0.5 is the first measured value or, where a
+    signal is not measured, the rest without friction; the range is that of noise and friction.
+
+    Attributes
+    ----------
+    stretches : list of Stretch
+        The data.
+    signals : tuple of str
+        Outputs that are fitted: measured in any recording.
+    unknowns : Unknowns
+        What is searched, in the order of the point.
+    size : int
+        Length of a point.
+    noise : dict of str to float
+        Standard deviation by which each signal's residuals are divided [% of span].
     """
 
-    def __init__(self, recordings: Sequence[Recording], branch: str) -> None:
-        """Collect the stretches and weigh each signal by its noise."""
-        self.branch = branch
-        self.signals = tuple(
-            name for name in OUTPUTS if all(name in recording.signals for recording in recordings)
+    def __init__(
+        self,
+        recordings: Sequence[Recording],
+        branch: str = BRANCH.default,
+        *,
+        signals: Sequence[str] | None = None,
+        effects: Sequence[str] = (),
+    ) -> None:
+        """Collect the stretches and weigh each signal by its noise.
+
+        Parameters
+        ----------
+        recordings : sequence of Recording
+            The data, fitted together.
+        branch : {'zoh', 'printed'}
+            Form of the condition of eq. (5).
+        signals : sequence of str, optional
+            Outputs to fit; all that are measured by default.
+        effects : sequence of str
+            Effects to add to the valve, all their parameters being unknown.
+
+        Raises
+        ------
+        IdentificationError
+            If an output is not measured, or u or an output is constant.
+        """
+        self.branch, self.effects = branch, tuple(effects)
+        self.signals = _chosen(recordings, signals)
+        self.stretches = stretches_of(recordings, self.signals)
+        refuse_flat(self.stretches, self.signals)
+        self.noise = {name: noise_of(self.stretches, name) for name in self.signals}
+        steps = [s.dt[1:] for s in self.stretches]
+        self.sample_time = float(np.median(np.concatenate(steps)))
+        self.duration = float(sum(s.dt.sum() for s in self.stretches))
+        self._extra = ValveSpec(effects=self.effects).parameters[len(BASE) :]
+        self.unknowns = valve_unknowns(self.sample_time, self.duration, extra=self._extra)
+        self._started = _longest(self.stretches, MOST_STARTS)
+        self._kinds = tuple(
+            OUTPUTS.index(name)
+            for name in OUTPUTS
+            if any(OUTPUTS.index(later) >= OUTPUTS.index(name) for later in self.signals)
         )
-        if not self.signals:
-            raise IdentificationError(
-                'no output is measured in all recordings: expected p1, p2 or x beside u'
-            )
-        self.stretches = [
-            Stretch(
-                recording.u[part],
-                np.diff(recording.time[part], prepend=recording.time[part][:1]),
-                {name: recording.output(name)[part] for name in self.signals},
-            )
-            for recording in recordings
-            for part in recording.segments
-        ]
-        self._refuse_flat()
-        self.noise = {name: self._noise(name) for name in self.signals}
-        starts = len(self.stretches) if len(self.stretches) <= MOST_STARTS else 0
-        self.nuisances = [
-            (index, name)
-            for index in range(starts)
-            for name in ('p1', 'p2')
-            if name not in self.signals and any(later in self.signals for later in ('p2', 'x'))
-        ]
-        self.size = len(UNKNOWNS) + len(self.nuisances)
-        self.weights = [
-            {name: np.isfinite(stretch.measured[name]).astype(float) for name in self.signals}
+        self.size = len(self.unknowns) + len(self._started) * len(self._kinds)
+        self.counts = [
+            {name: np.isfinite(stretch.measured[name]) for name in self.signals}
             for stretch in self.stretches
         ]
+        self._flatten()
 
-    def stages(self) -> list[tuple[str, list[int]]]:
-        """Return, per measured signal in the order of the flow, the unknowns it first sees."""
-        groups: list[tuple[str, list[int]]] = []
-        pending: list[int] = []
-        for name in OUTPUTS:
-            pending += [UNKNOWNS.index(unknown) for unknown in STAGE[name]]
-            if name in self.signals:
-                groups.append((name, pending))
-                pending = []
-        for offset, (_, name) in enumerate(self.nuisances):
-            late = name == 'p2' or 'p2' not in self.signals
-            groups[-1 if late else 0][1].append(len(UNKNOWNS) + offset)
-        return groups
+    def middle(self) -> Array:
+        """Return the point in the middle of all ranges, shape (size,)."""
+        return np.full(self.size, 0.5)
+
+    def point(self, values: Mapping[str, float]) -> Array:
+        """Return the point of parameter values, with starting states as measured."""
+        point = self.middle()
+        point[: len(self.unknowns)] = self.unknowns.point(values)
+        return point
 
     def values(self, point: Array) -> dict[str, float]:
-        """Return the parameters at `point`, shape (size,), of the unit cube."""
-        values = {'a_1': A_1_HELD}
-        for name, share in zip(UNKNOWNS[:4], point, strict=False):
-            declared = DECLARED[name]
-            if declared.scale == 'log':
-                values[name] = declared.lower * (declared.upper / declared.lower) ** share
-            else:
-                values[name] = declared.lower + share * (declared.upper - declared.lower)
-        values['f_d'] = values['f_s'] * point[4]
-        low, high = RATIO_BOUNDS
-        values['a_2'] = A_1_HELD / (low * (high / low) ** point[5])
-        return {name: float(value) for name, value in values.items()}
+        """Return the parameters at `point`, shape (size,)."""
+        return self.unknowns.values(point)
 
     def spec(self, point: Array) -> ValveSpec:
         """Return the valve at `point`."""
-        return ValveSpec(self.values(point), self.branch)
+        return ValveSpec(self.values(point), self.branch, effects=self.effects)
 
     def simulate(self, point: Array) -> list[Array]:
         """Return p1, p2, x, shape (3, n), for each stretch."""
-        values = self.values(point)
-        spec = ValveSpec(values, self.branch)
-        theta = spec.theta
-        shares = dict(zip(self.nuisances, 2.0 * point[len(UNKNOWNS) :] - 1.0, strict=True))
+        spec = self.spec(point)
+        run = machine(spec).run
+        starts = point[len(self.unknowns) :].reshape(-1, len(self._kinds))
+        shares = dict(zip(self._started, 2.0 * starts - 1.0, strict=True))
         outputs = []
         for index, stretch in enumerate(self.stretches):
-            state = self._start(index, stretch, values, shares).array(spec)
+            state = InitialState(*self._start(stretch, spec, shares.get(index))).array(spec)
             result = np.empty((3, stretch.u.size))
-            make().run(
-                stretch.u,
-                stretch.dt,
-                state,
-                theta,
-                pipeline.BASE_STEP,
-                NO_EFFECTS,
-                NO_EFFECTS,
-                result,
-            )
+            run(stretch.u, stretch.dt, state, *drive(spec), result)
             outputs.append(result)
         return outputs
 
-    def residuals(self, point: Array, signals: Sequence[str] | None = None) -> Array:
-        """Return all residuals over the noise of their signal, shape (m,)."""
-        parts = []
-        for stretch, weights, result in zip(
-            self.stretches, self.weights, self.simulate(point), strict=True
-        ):
-            for name in signals or self.signals:
-                error = np.nan_to_num(stretch.measured[name]) - result[OUTPUTS.index(name)]
-                parts.append(error * weights[name] / self.noise[name])
-        return np.concatenate(parts)
+    def residuals(self, point: Array) -> Array:
+        """Return measured minus simulated over the noise, shape (m,): lost samples give 0.
 
-    def withheld(self, start: float, stop: float) -> 'Problem':
-        """Return a copy whose samples from share `start` to `stop` of the data do not count."""
-        copy = Problem.__new__(Problem)
-        copy.__dict__.update(self.__dict__)
-        total = sum(stretch.u.size for stretch in self.stretches)
-        copy.weights, first = [], 0
-        for stretch, weights in zip(self.stretches, self.weights, strict=True):
-            place = (first + np.arange(stretch.u.size)) / total
-            counts = (place < start) | (place >= stop)
-            copy.weights.append({name: weight * counts for name, weight in weights.items()})
-            first += stretch.u.size
-        return copy
+        The order is that of `blocks`.
+        """
+        outputs = self.simulate(point)
+        whole = np.concatenate(
+            [result[OUTPUTS.index(name)] for result in outputs for name in self.signals]
+        )
+        np.subtract(self._measured, whole, out=whole)
+        whole *= self._scale
+        return whole
+
+    def jacobian(
+        self, point: Array, base: Array | None = None, step: float | Array = STEP
+    ) -> Array:
+        """Return the derivatives of the residuals by the shares, shape (m, size).
+
+        Parameters
+        ----------
+        point : ndarray, shape (size,)
+            Where.
+        base : ndarray, shape (m,), optional
+            Residuals there, if they are known: one simulation less.
+        step : float or ndarray, shape (size,)
+            Step of the difference; it turns round where it would leave the cube.
+        """
+        base = self.residuals(point) if base is None else base
+        result = np.zeros((base.size, self.size), order='F')
+        steps = np.broadcast_to(step, point.shape)
+        inside = (point + steps >= 0.0) & (point + steps <= 1.0)
+        steps = np.where(inside, steps, -steps)
+        for column in range(len(self.unknowns)):
+            moved = point.copy()
+            moved[column] += steps[column]
+            np.subtract(self.residuals(moved), base, out=result[:, column])
+            result[:, column] /= steps[column]
+        for kind in range(len(self._kinds)):
+            self._start_columns(point, base, kind, steps, result)
+        return result
+
+    def with_free_a_1(self) -> 'Problem':
+        """Return a copy in which a_1 is searched too, the last of the unknowns."""
+        other = copy.copy(self)
+        other.unknowns = valve_unknowns(self.sample_time, self.duration, True, self._extra)
+        other.size = self.size + 1
+        return other
+
+    def with_a_1(self, point: Array) -> Array:
+        """Return a point of this problem as one of `with_free_a_1`."""
+        share = self.with_free_a_1().unknowns.each[-1].share(A_1_HELD)
+        return np.insert(point, len(self.unknowns), share)
+
+    def withheld(self, counts: Sequence[Mask]) -> 'Problem':
+        """Return a copy in which only some samples count: masks of shape (n,) by stretch."""
+        other = copy.copy(self)
+        other.counts = [
+            {name: known & mask for name, known in stretch.items()}
+            for stretch, mask in zip(self.counts, counts, strict=True)
+        ]
+        other._flatten()
+        return other
+
+    def with_starts(self, point: Array, other: Array, masks: Sequence[Mask]) -> Array:
+        """Return `point` with the starting states of `other` where a stretch starts masked."""
+        result = point.copy()
+        width = len(self._kinds)
+        for place, index in enumerate(self._started):
+            if masks[index][0]:
+                first = len(self.unknowns) + place * width
+                result[first : first + width] = other[first : first + width]
+        return result
+
+    def _flatten(self) -> None:
+        """Lay measurements and weights out in the order of the residuals."""
+        self.blocks: list[tuple[str, slice]] = []
+        measured, scale, first = [], [], 0
+        for stretch, counts in zip(self.stretches, self.counts, strict=True):
+            for name in self.signals:
+                measured.append(np.where(counts[name], stretch.measured[name], 0.0))
+                scale.append(counts[name] / self.noise[name])
+                self.blocks.append((name, slice(first, first + stretch.u.size)))
+                first += stretch.u.size
+        self._measured, self._scale = np.concatenate(measured), np.concatenate(scale)
 
     def _start(
-        self,
-        index: int,
-        stretch: Stretch,
-        values: dict[str, float],
-        shares: dict[tuple[int, str], float],
-    ) -> InitialState:
-        """Return the state before a stretch, measured where it can be."""
-        first = {name: _first(stretch.measured[name]) for name in self.signals}
-        p1 = first.get('p1', stretch.u[0] + shares.get((index, 'p1'), 0.0) * values['f_d1'])
-        near = first.get('x', p1)
-        p2 = first.get('p2', near + shares.get((index, 'p2'), 0.0) * values['f_s'])
-        return InitialState(float(p1), float(p2), float(first.get('x', p2)))
+        self, stretch: Stretch, spec: ValveSpec, shares: Array | None
+    ) -> tuple[float, float, float]:
+        """Return p1, p2, x before a stretch."""
+        given = np.zeros(3)
+        if shares is not None:
+            given[list(self._kinds)] = shares
+        first = stretch.first
+        p1 = first.get('p1', stretch.u[0])
+        p1 += given[0] * (self._reach('p1') if 'p1' in first else spec.values['f_d1'])
+        x = first.get('x', first.get('p2', p1)) + given[2] * self._reach('x')
+        p2 = first.get('p2', x)
+        p2 += given[1] * (self._reach('p2') if 'p2' in first else spec.values['f_s'])
+        return float(p1), float(p2), float(x)
 
-    def _noise(self, name: str) -> float:
-        """Return the noise of a signal [% of span] from its second differences, robustly."""
-        bends = np.concatenate([np.diff(s.measured[name], 2) for s in self.stretches])
-        bends = np.abs(bends[np.isfinite(bends)])
-        spread = float(np.median(bends)) / (0.6745 * math.sqrt(6.0)) if bends.size else 0.0
-        return max(spread, 0.02)
+    def _reach(self, name: str) -> float:
+        """Return how far a starting value may lie from the first measured one [% of span]."""
+        return 8.0 * self.noise[name] if name in self.noise else 0.0
 
-    def _refuse_flat(self) -> None:
-        """Refuse data from which nothing can be learnt."""
-        u = np.concatenate([stretch.u for stretch in self.stretches])
-        if np.ptp(u) < 1e-9:
+    def _start_columns(
+        self, point: Array, base: Array, kind: int, steps: Array, result: Array
+    ) -> None:
+        """Fill in the derivatives by one kind of start, of all stretches in one simulation."""
+        columns = len(self.unknowns) + kind + len(self._kinds) * np.arange(len(self._started))
+        moved = point.copy()
+        moved[columns] += steps[columns]
+        change = self.residuals(moved) - base
+        width = len(self.signals)
+        for index, column, by in zip(self._started, columns, steps[columns], strict=True):
+            mine = self.blocks[index * width : (index + 1) * width]
+            rows = slice(mine[0][1].start, mine[-1][1].stop)
+            result[rows, column] = change[rows] / by
+
+
+def _chosen(recordings: Sequence[Recording], wanted: Sequence[str] | None) -> tuple[str, ...]:
+    """Return the outputs to fit, in the order of the flow."""
+    measured = tuple(
+        name for name in OUTPUTS if any(name in recording.signals for recording in recordings)
+    )
+    for name in wanted or ():
+        if name not in measured:
             raise IdentificationError(
-                f'u is constant at {u[0]:g} %: nothing can be identified; record the valve while '
-                'the command steps up and down'
+                f'{name} is not measured in this data: expected some of '
+                f'{", ".join(measured) or "p1, p2, x, of which it has none"}'
             )
-        for name in self.signals:
-            values = np.concatenate([stretch.measured[name] for stretch in self.stretches])
-            if not np.nanmax(values) - np.nanmin(values) > 1e-9:
-                raise IdentificationError(
-                    f'{name} is constant: the valve did not move or the sensor is dead; check '
-                    f'the topic of {name} or leave it out'
-                )
+    chosen = measured if wanted is None else tuple(n for n in measured if n in wanted)
+    if not chosen:
+        raise IdentificationError(
+            'no output is measured: expected p1, p2 or x beside u; name the topics'
+        )
+    return chosen
 
 
-def _first(values: Array) -> float:
-    """Return the first value that is not lost."""
-    return float(values[np.flatnonzero(np.isfinite(values))[0]])
+def _longest(stretches: Sequence[Stretch], most: int) -> list[int]:
+    """Return the places of the longest stretches, in order."""
+    order = sorted(range(len(stretches)), key=lambda index: -stretches[index].u.size)
+    return sorted(order[:most])

@@ -1,110 +1,125 @@
 # Copyright 2026 The valve_sim_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The search: a global one per stage in the order of the flow, then a joint local polish."""
+"""The search: starts from the physics and from everywhere, a race of the best, then a polish."""
 
-from collections.abc import Callable
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
 
 import numpy as np
-from scipy.optimize import differential_evolution, least_squares
+from scipy.stats import qmc
 
 from ..model.pipeline import Array
-from .problem import Problem, UNKNOWNS
+from .descent import End
+from .problem import Problem
+from .starts import staged_starts
+from .view import best_of, distinct, Task, View
+from .watch import Watch
 
-if TYPE_CHECKING:
-    Progress = Callable[[float, str], None]
-
-GENERATIONS = 60
-POPULATION = 8
-"""Members per unknown."""
+BLIND = 128
+"""Points spread evenly over the cube that are tried beside those of the physics."""
+STARTS = 12
+HEATS = ((32, 5), (8, 3), (2, 1))
+"""The race: width of the blur, and how many go on to the next heat."""
+STRIDES = 5
+"""Steps of each descent in a heat."""
+COARSE = 3e-3
+"""Step of the derivatives in the race: it passes over the small kinks of the cost."""
+POLISH = ((4, 1e-3), (1, 1e-3), (1, 1e-4), (1, 1e-5))
+"""Width of the blur and step of the derivatives."""
 MOST_STEPS = 30
-RATIO = UNKNOWNS.index('a_1/a_2')
-USUAL_RATIOS = (0.87, 0.6, 0.3)
-"""Shares of the logarithmic range: about 10, 2 and 0.3 1/s. The cost is nearly flat in a_1/a_2 far
-from the optimum, so it takes no part in the global search and several starts in the polish."""
+HOPS = (0.7, 2.0, 6.0, 20.0, 60.0, 200.0)
+"""Standard deviations by which each unknown hops off the optimum, the others following."""
+HOPPERS = 6
+ROUNDS = 8
+HOP_WIDTH = 8
+PROMISING = 1.3
+"""A hop that ends within this factor of the best cost is polished."""
+GAIN = 1e-6
 
 
-def search(problem: Problem, seed: int, progress: 'Progress') -> tuple[Array, Array]:
-    """Maximise the fitness of all measured signals, each weighed by its noise.
+def search(problem: Problem, seed: int = 0, watch: Watch | None = None) -> End:
+    """Find the point of least weighted squares; no start is needed.
 
-    Each stage's unknowns are searched globally (differential evolution) on the first measured
-    signal that sees them, the stages before held at what was found; at last all are polished
-    together (least squares). No start is needed; the same seed gives the same result.
+    Staged starts from the physics and the best of a Sobol sequence race down through blurs that
+    fade; the winner is polished on the sharp cost, then tries hops along each unknown's ridge
+    until none leads further down.
 
     Parameters
     ----------
     problem : Problem
         What to fit.
     seed : int
-        Seed of the global search.
-    progress : callable
-        Called with the share done, 0 to 1, and what is being done.
-
-    Returns
-    -------
-    point : ndarray, shape (size,)
-        Best point of the unit cube.
-    jacobian : ndarray, shape (m, size)
-        Of the residuals there.
+        Seed of the blind starts; the same seed gives the same result.
+    watch : Watch, optional
+        Told of every simulation; what its callback raises goes through.
     """
-    point = np.full(problem.size, 0.5)
-    point[RATIO] = USUAL_RATIOS[0]
-    stages = problem.stages()
-    for number, (signal, unknowns) in enumerate(stages):
-        progress(number / (len(stages) + 1), f'searching {signal}')
-        point = _global(problem, point, signal, unknowns, seed)
-    progress(len(stages) / (len(stages) + 1), 'polishing all together')
-    return polish(problem, point, USUAL_RATIOS)
-
-
-def _global(problem: Problem, point: Array, signal: str, unknowns: list[int], seed: int) -> Array:
-    """Search some unknowns on one signal; the others stay."""
-
-    def cost(part: Array) -> float:
-        trial = point.copy()
-        trial[unknowns] = part
-        residuals = problem.residuals(trial, (signal,))
-        return float(residuals @ residuals)
-
-    found = differential_evolution(
-        cost,
-        [(0.0, 1.0)] * len(unknowns),
-        maxiter=GENERATIONS,
-        popsize=POPULATION,
-        init='sobol',
-        tol=1e-6,
-        polish=False,
-        seed=seed,
-    )
-    best = point.copy()
-    best[unknowns] = found.x
+    watch = watch or Watch()
+    view = View(problem, watch)
+    staged = [view.scored(point) for point in staged_starts(problem)]
+    blind = [view.scored(point) for point in _blind(problem, seed)]
+    runners = staged + best_of(blind, STARTS - len(staged))
+    for width, places in HEATS:
+        blurred = View(problem, watch, width)
+        ends = [blurred.descend(end.point, STRIDES, COARSE) for end in runners]
+        runners = distinct(ends, places)
+    best = polish(problem, runners[0].point, watch)
+    for _ in range(ROUNDS):
+        hopped = _hop(problem, view, best)
+        if hopped.cost > best.cost * (1.0 - GAIN):
+            break
+        best = hopped
     return best
 
 
-def polish(problem: Problem, point: Array, ratios: tuple[float, ...] = ()) -> tuple[Array, Array]:
-    """Polish all unknowns on all signals, from `point` and from it with other stem speeds.
+def polish(
+    problem: Task,
+    point: Array,
+    watch: Watch | None = None,
+    stages: Sequence[tuple[int, float]] = POLISH,
+) -> End:
+    """Go down from `point` with steps of falling size; return the best end on the sharp cost."""
+    watch = watch or Watch()
+    ends = []
+    for width, step in stages:
+        end = View(problem, watch, width).descend(point, MOST_STEPS, step)
+        point = end.point
+        if width == 1:
+            ends.append(end)
+    return best_of(ends, 1)[0]
 
-    Returns what `search` does.
-    """
-    starts = [point]
-    for share in ratios:
-        if share != point[RATIO]:
-            starts.append(point.copy())
-            starts[-1][RATIO] = share
-    return min((_descend(problem, start) for start in starts), key=lambda end: end[2])[:2]
+
+def _hop(problem: Problem, view: View, best: End) -> End:
+    """Leave the optimum along the ridge of each unknown and go down again from the best places."""
+    trials = [view.scored(point) for point in _around(problem, view, best)]
+    first = best_of(trials, 1)[0]
+    if first.cost < best.cost * (1.0 - GAIN):
+        return polish(problem, first.point, view.watch)
+    blurred = View(problem, view.watch, HOP_WIDTH)
+    ends = [blurred.descend(end.point, 3, COARSE) for end in best_of(trials, HOPPERS)]
+    end = view.scored(best_of(ends, 1)[0].point)
+    if end.cost < PROMISING * best.cost:
+        return polish(problem, end.point, view.watch)
+    return end
 
 
-def _descend(problem: Problem, point: Array) -> tuple[Array, Array, float]:
-    """Go down from one start; steps of falling size pass over small kinks of the cost."""
-    start = np.clip(point, 1e-9, 1.0 - 1e-9)
-    for step in (1e-3, 1e-5):
-        found = least_squares(
-            problem.residuals,
-            start,
-            bounds=(0.0, 1.0),
-            diff_step=step,
-            x_scale=0.1,
-            max_nfev=MOST_STEPS,
-        )
-        start = np.clip(found.x, 1e-9, 1.0 - 1e-9)
-    return found.x, found.jac, float(found.cost)
+def _around(problem: Problem, view: View, best: End) -> list[Array]:
+    """Return points along each unknown's ridge: where the others best make up for its change."""
+    blurred = View(problem, view.watch, HOP_WIDTH)
+    jacobian = blurred.jacobian(best.point, None, COARSE)
+    residuals = blurred.scored(best.point).residuals
+    variance = max(float(residuals @ residuals) / np.count_nonzero(residuals), 1e-3)
+    information = jacobian.T @ jacobian + 1e-3 * np.eye(best.point.size)
+    covariance = variance * np.linalg.inv(information)
+    points = []
+    for index in range(len(problem.unknowns)):
+        ridge = covariance[:, index] / np.sqrt(covariance[index, index])
+        for length in HOPS:
+            points += [np.clip(best.point + by * ridge, 0.0, 1.0) for by in (-length, length)]
+    return points
+
+
+def _blind(problem: Problem, seed: int) -> Array:
+    """Return points spread evenly over the unknowns, starting states as measured."""
+    known = len(problem.unknowns)
+    points = np.tile(problem.middle(), (BLIND, 1))
+    points[:, :known] = qmc.Sobol(known, seed=seed).random(BLIND)
+    return points

@@ -200,6 +200,8 @@ class Valve:
         self._background = background
         self._make: Make | None = None
         self._compiled: Callable[..., float] | None = None
+        self._state: Any = None
+        self._first = True
         self.spec = spec or ValveSpec()
         self.reset()
 
@@ -254,7 +256,8 @@ class Valve:
         first = self._make is None
         self._make, self._step = make, make.interpreted
         if not first:
-            self._begin(InitialState(*map(float, self._state[:2]), self._position))
+            p1, p2 = map(float, self._state[:2])
+            self._begin(InitialState(p1, p2, self._position))
         if self._background:
             threading.Thread(
                 target=self._compile, args=(make, self._spec), name='compile', daemon=True
@@ -268,7 +271,7 @@ class Valve:
         self._drive = drive(self._spec)
         # plain numbers are what the interpreted step is fastest with
         interpreting = self._make is not None and self._step is self._make.interpreted
-        self._state: Any = state.tolist() if interpreting else state
+        self._state = state.tolist() if interpreting else state
         self._position = initial.x
         self._first = True
 

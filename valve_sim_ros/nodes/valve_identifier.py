@@ -17,6 +17,7 @@ from std_msgs.msg import Float64, Float64MultiArray, String
 from ..identification.errors import IdentificationError
 from ..identification.identify import identify
 from ..identification.result import Identification
+from ..identification.watch import Stop
 from ..model.parameters import PAPER_SEVEN
 from .diagnosing import DiagnoseService, Material
 from .long_service import Job, LongService
@@ -87,9 +88,11 @@ class ValveIdentifier(Node):
             seed=self.get_parameter('seed').value,
             hold_out=self.get_parameter('hold_out').value,
             progress=self._progress,
+            interruptible=True,
         )
         self._write(result)
-        self._publish(result)
+        if self.context.ok():
+            self._publish(result)
         return result
 
     def _write(self, result: Identification) -> None:
@@ -126,9 +129,9 @@ class ValveIdentifier(Node):
         return self._bags(), {'topics': self._topics(), 'seed': seed}
 
     def _progress(self, share: float, text: str) -> None:
-        """Say how far the fit is; give it up once the node is told to end."""
+        """Say how far the fit is; once the node is told to end, the best so far must do."""
         if not self.context.ok():
-            raise ExternalShutdownException
+            raise Stop
         self.get_logger().info(f'{100.0 * share:.0f} % {text}', throttle_duration_sec=1.0)
 
     def _declare_all(self) -> None:
@@ -137,7 +140,7 @@ class ValveIdentifier(Node):
         for name, default, words, limits in (
             ('output_directory', '', 'Folder for fitted.yaml and identify.json; empty: none', []),
             ('seed', 0, 'Seed of the global search', [SEEDS]),
-            ('hold_out', True, 'Also fit with the first and the last third held out', []),
+            ('hold_out', True, 'Also fit without the outer thirds, or each of several bags', []),
             ('identify_at_start', True, 'Identify at the start if there are bags', []),
         ):
             descriptor = ParameterDescriptor(description=words, integer_range=limits)

@@ -6,6 +6,7 @@ import csv
 import hashlib
 import os
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -40,7 +41,7 @@ def read_csv(path: str | os.PathLike[str], topics: Topics | None = None) -> Reco
     header = [cell.split('[')[0].strip() for cell in next(csv.reader([rows[0][1]]))]
     columns = _columns(path, header, topics)
     table = _table(path, rows, len(header))
-    signals = {}
+    signals: dict[str, Any] = {}
     for name, (index, scale, offset) in columns.items():
         signals[name] = table[:, index] * scale + offset
     time = table[:, header.index('t')]

@@ -165,7 +165,7 @@ class Quality:
 
 def milliseconds(seconds: float) -> str:
     """Return a short time in words."""
-    return f'{1e3 * seconds:.3g} ms'
+    return f'{round(1e3 * seconds, 6):.3g} ms'
 
 
 def resolution(values: Array) -> float:

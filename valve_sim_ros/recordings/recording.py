@@ -5,6 +5,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -154,9 +155,12 @@ class Recording:
         origin = float(self.time[first])
         known = self.provenance.start
         moved = None if known is None else known + round(origin * 1e9)
+        arrays: dict[str, Any] = {
+            name: values[first:last] for name, values in self._present().items()
+        }
         return Recording(
             time=self.time[first:last] - origin,
-            **{name: values[first:last] for name, values in self._present().items()},
+            **arrays,
             provenance=replace(self.provenance, start=moved),
             max_gap=self._longest_step,
         )

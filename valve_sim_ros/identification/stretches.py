@@ -1,0 +1,111 @@
+# Copyright 2026 The valve_sim_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Recordings as runs of samples without a gap, ready for the compiled model."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+import math
+
+import numpy as np
+import numpy.typing as npt
+
+from ..model.pipeline import Array
+from ..recordings.recording import Recording
+from .errors import IdentificationError
+
+LEAST_NOISE = 0.02
+"""Noise that is assumed at least [% of span], so that clean simulated data can be fitted too."""
+
+Mask = npt.NDArray[np.bool_]
+
+SAME_STEP = 1e-6
+"""Relative difference up to which two steps of time are the same one."""
+
+
+@dataclass(frozen=True)
+class Stretch:
+    """A run of samples without a gap.
+
+    Attributes
+    ----------
+    u, dt : ndarray, shape (n,)
+        Command [% of span] and time since the sample before [s], 0 for the first.
+    measured : dict of str to ndarray, shape (n,)
+        Outputs [% of span]; NaN where a sample was lost.
+    recording : int
+        Which recording it comes from.
+    """
+
+    u: Array
+    dt: Array
+    measured: dict[str, Array]
+    recording: int
+
+    @cached_property
+    def first(self) -> dict[str, float]:
+        """The first measured value of each output that has one [% of span]."""
+        found = {}
+        for name, values in self.measured.items():
+            known = np.flatnonzero(np.isfinite(values))
+            if known.size:
+                found[name] = float(values[known[0]])
+        return found
+
+
+def stretches_of(recordings: Sequence[Recording], signals: Sequence[str]) -> list[Stretch]:
+    """Cut recordings at their gaps."""
+    return [
+        Stretch(
+            recording.u[part],
+            _steps(recording.time[part]),
+            {name: _measured(recording, name)[part] for name in signals},
+            number,
+        )
+        for number, recording in enumerate(recordings)
+        for part in recording.segments
+    ]
+
+
+def _measured(recording: Recording, name: str) -> Array:
+    """Return an output, all lost where a recording does not have it."""
+    if name in recording.signals:
+        return recording.output(name)
+    return np.full(len(recording), np.nan)
+
+
+def _steps(time: Array) -> Array:
+    """Return the steps [s], 0 first; those that differ by rounding alone become equal.
+
+    What the model derives from a step is kept while the step stays the same.
+    """
+    steps = np.diff(time, prepend=time[:1])
+    if steps.size > 1:
+        usual = float(np.median(steps[1:]))
+        steps[np.abs(steps - usual) < SAME_STEP * usual] = usual
+    return steps
+
+
+def noise_of(stretches: Sequence[Stretch], name: str) -> float:
+    """Return the noise of a signal [% of span] from its second differences, robustly."""
+    bends = np.concatenate([np.diff(s.measured[name], 2) for s in stretches])
+    bends = np.abs(bends[np.isfinite(bends)])
+    spread = float(np.median(bends)) / (0.6745 * math.sqrt(6.0)) if bends.size else 0.0
+    return max(spread, LEAST_NOISE)
+
+
+def refuse_flat(stretches: Sequence[Stretch], signals: Sequence[str]) -> None:
+    """Raise an IdentificationError for data from which nothing can be learnt."""
+    u = np.concatenate([stretch.u for stretch in stretches])
+    if np.ptp(u) < 1e-9:
+        raise IdentificationError(
+            f'u is constant at {u[0]:g} %: nothing can be identified; record the valve while '
+            'the command steps up and down'
+        )
+    for name in signals:
+        values = np.concatenate([stretch.measured[name] for stretch in stretches])
+        if not np.isfinite(values).any() or not np.nanmax(values) - np.nanmin(values) > 1e-9:
+            raise IdentificationError(
+                f'{name} is constant: the valve did not move or the sensor is dead; check '
+                f'the topic of {name} or leave it out'
+            )
