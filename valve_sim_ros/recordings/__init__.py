@@ -14,8 +14,12 @@ from .topics import Topics
 __all__ = ['Recording', 'RecordingError', 'read_commands', 'read_recording', 'write_recording']
 
 
-def read_recording(path: str | os.PathLike[str], topics: Topics | None = None) -> Recording:
-    """Read a bag (folder, .mcap or .db3 file) or a CSV file.
+def read_recording(
+    path: str | os.PathLike[str],
+    topics: Topics | None = None,
+    sample_time: float | None = None,
+) -> Recording:
+    """Read a bag (folder, .mcap or .db3 file, compressed or not) or a CSV file.
 
     Parameters
     ----------
@@ -23,6 +27,8 @@ def read_recording(path: str | os.PathLike[str], topics: Topics | None = None) -
         What to read.
     topics : mapping of str to str, optional
         Topic or CSV column by signal, as ``{'x': '/valve_7/position'}``.
+    sample_time : float, optional
+        Sampling period of the valve [s], for bags that hold only some of its samples.
 
     Raises
     ------
@@ -32,7 +38,9 @@ def read_recording(path: str | os.PathLike[str], topics: Topics | None = None) -
     path = Path(path)
     if not path.exists():
         raise RecordingError(f'{path}: no such bag or CSV file; check the path')
-    return read_csv(path, topics) if path.suffix.lower() == '.csv' else read_bag(path, topics)
+    if path.suffix.lower() == '.csv':
+        return read_csv(path, topics)
+    return read_bag(path, topics, sample_time=sample_time)
 
 
 def read_commands(path: str | os.PathLike[str], topics: Topics | None = None) -> Recording:

@@ -32,8 +32,7 @@ class SignalQuality:
     jitter : float
         Robust standard deviation of the stamps about the regular grid [s].
     offset : float
-        Median stamp relative to the reference output of the same sample [s]; for u: median time
-        from a command to the tick that used it [s].
+        Median stamp relative to the grid of the samples [s].
     resolution : float
         Smallest step between two different values [% of span]; NaN for a constant.
     """
@@ -117,6 +116,15 @@ class Quality:
         Samples dropped because no command was known yet.
     ambiguous_commands : int
         Commands so close to a tick that their sample is in doubt.
+    decided_commands : int
+        Such commands whose sample the outputs themselves decided.
+    command_offset : float
+        How much later the outputs are stamped than u [s], always less than a sample.
+    command_offset_range : tuple of float
+        All offsets that explain the outputs as well [s]; NaN if the data cannot tell.
+    dead_samples : int
+        Whole samples by which the outputs answer later still: a dead time of the valve, which
+        stays in the data.
     notes : tuple of str
         Anything else worth a sentence.
     """
@@ -130,6 +138,10 @@ class Quality:
     signals: Mapping[str, SignalQuality] = field(default_factory=dict)
     head_trimmed: int = 0
     ambiguous_commands: int = 0
+    decided_commands: int = 0
+    command_offset: float = float('nan')
+    command_offset_range: tuple[float, float] = (float('nan'), float('nan'))
+    dead_samples: int = 0
     notes: tuple[str, ...] = ()
 
     @property
@@ -155,12 +167,40 @@ class Quality:
         lines += [f'gap: {gap.text()}' for gap in self.gaps]
         if self.head_trimmed:
             lines.append(f'{self.head_trimmed} samples before the first command left out')
+        lines += self._timing()
         if self.ambiguous_commands:
             lines.append(
                 f'{self.ambiguous_commands} commands lie so close to a sample that they may '
                 'belong to its neighbour'
             )
         return lines + list(self.notes)
+
+    def _timing(self) -> list[str]:
+        """Return what is known about the time between u and the outputs, in words."""
+        if not np.isfinite(self.command_offset):
+            return []
+        low, high = self.command_offset_range
+        if np.isfinite(low):
+            lines = [
+                f'offset of the outputs against u: {milliseconds(self.command_offset)} (from '
+                f'{milliseconds(low)} to {milliseconds(high)} fits as well)'
+            ]
+        else:
+            lines = [
+                f'offset of the outputs against u: {milliseconds(self.command_offset)} assumed, '
+                'the data cannot tell'
+            ]
+        if self.dead_samples:
+            lines.append(
+                f'the outputs answer {self.dead_samples} samples later than stamps explain: a '
+                'dead time of the valve'
+            )
+        if self.decided_commands:
+            lines.append(
+                f'{self.decided_commands} commands near a tick were put to the sample at which '
+                'the outputs answer'
+            )
+        return lines
 
 
 def milliseconds(seconds: float) -> str:
