@@ -97,7 +97,7 @@ def align(
             regular=main.regular,
             jitter=main.jitter,
             signals={name: _figures(name, found[name], placed, commands) for name in arrivals},
-            notes=(*notes, *_remarks(strays, commands, found, reference, period, sample_time)),
+            notes=(*notes, *_remarks(strays, found, reference, period, sample_time)),
         ),
         [epoch.set_back for epoch in parts],
         replace(provenance, start=origin),
@@ -292,7 +292,6 @@ def _figures(
 
 def _remarks(
     strays: int,
-    commands: Hold,
     found: Mapping[str, SignalQuality],
     reference: str,
     period: float,

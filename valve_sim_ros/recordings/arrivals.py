@@ -12,11 +12,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
+from .grid import due
 from .quality import Array, resolution, SignalQuality
 
 Stamps = npt.NDArray[np.int64]
 DETACHED = 10.0
 """A first stamp of 0 that lies so many median steps before the next one is no stamp."""
+LATEST = 2**62
+"""No stamp [ns since 1970] of this century is later."""
+FEWEST_FOR_BURSTS = 20
 SMALLEST_JUMP = 2.5
 """The clock can be seen to be set back by so many periods or more."""
 
@@ -86,6 +90,8 @@ def epochs(arrivals: Mapping[str, Arrivals]) -> tuple[list[Epoch], dict[str, Sig
         signals = {}
         for name, each in epoch.signals.items():
             signals[name], counts[name] = _in_order(each, counts[name])
+            if name != 'u':
+                signals[name], counts[name] = _without_bursts(signals[name], counts[name])
         ordered.append(replace(epoch, signals=signals))
     return ordered, {
         name: replace(count, rate=_rate([e.signals[name].stamps for e in ordered]))
@@ -94,8 +100,8 @@ def epochs(arrivals: Mapping[str, Arrivals]) -> tuple[list[Epoch], dict[str, Sig
 
 
 def _without_zeros(each: Arrivals) -> tuple[Arrivals, int]:
-    """Drop stamps of 0 that lie far from all others: the clock was not known yet."""
-    zero = each.stamps <= 0
+    """Drop nonsense, and stamps of 0 far from all others: the clock was not known yet."""
+    zero = (each.stamps <= 0) | (each.stamps > LATEST)
     count = int(zero.sum())
     if not count or zero.all():
         return each, 0
@@ -166,6 +172,18 @@ def _in_order(each: Arrivals, count: SignalQuality) -> tuple[Arrivals, SignalQua
         duplicates=count.duplicates + repeats,
         out_of_order=count.out_of_order + late,
     )
+
+
+def _without_bursts(each: Arrivals, count: SignalQuality) -> tuple[Arrivals, SignalQuality]:
+    """Give messages that arrived in bursts the stamps at which they were due."""
+    if each.stamps.size < FEWEST_FOR_BURSTS:
+        return each, count
+    seconds = np.asarray(1e-9 * (each.stamps - each.stamps[0]), dtype=np.float64)
+    moved = due(seconds)
+    if moved is seconds:
+        return each, count
+    shift = np.round(1e9 * (moved - seconds)).astype(np.int64)
+    return replace(each, stamps=each.stamps + shift), replace(count, bursts=True)
 
 
 def _rate(stamps: list[Stamps]) -> float:

@@ -108,15 +108,17 @@ def opened(path: Path) -> Iterator[Bag]:
     refused = []
     with TemporaryDirectory(prefix='valve_sim_ros_') as folder:
         for file in files:
+            damage: list[str] = []
             try:
                 plain, damage = unpacked(file, Path(folder))
-                notes += damage
                 if plain.suffix == '.mcap':
                     ready.append(McapFile(plain))
                 else:
                     ready.append(SqliteFile(settled(plain, Path(folder))))
             except (RecordingError, OSError) as error:
-                refused.append(str(error))
+                refused.append('; '.join([*damage, str(error)]))
+            else:
+                notes += damage
         if not ready:
             raise RecordingError(f'{path}: {"; ".join([*refused, *notes])}')
         yield Bag(tuple(ready), (*notes, *refused), expected)

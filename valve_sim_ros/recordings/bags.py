@@ -106,8 +106,10 @@ def _read(
     selections = select(topics, counts, require_outputs)
     columns, notes = bag.read({chosen.topic for chosen in selections.values()})
     arrivals = _arrivals(selections, columns, connections, decoder)
+    commands_only = not require_outputs and len(selections) == 1
     messages = max(
-        each.stamps.size for name, each in arrivals.items() if name != 'u' or len(arrivals) == 1
+        (each.stamps.size for name, each in arrivals.items() if name != 'u' or commands_only),
+        default=0,
     )
     if messages < FEWEST_MESSAGES:
         raise RecordingError(

@@ -88,7 +88,8 @@ def hold(
         events = np.sort(events[largest])
     evidence = _evidence(stamps[events], stamps[changes], ticks, outputs, period)
     margin = max(2.0 * jitter, min(AMBIGUOUS, 0.1 * period))
-    if np.mean(evidence.min(axis=1, initial=0.0) < -DECIDED) < 1.0 - MOST_SILENT:
+    clear_answers = np.count_nonzero(evidence.min(axis=1, initial=0.0) < -DECIDED)
+    if clear_answers < (1.0 - MOST_SILENT) * events.size:
         evidence = np.zeros_like(evidence)
     total, spread = _best_offset(stamps[events], evidence, ticks, period, margin)
     # a whole sample is a dead time wherever the data allow it: a stamp lags by less

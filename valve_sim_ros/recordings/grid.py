@@ -22,8 +22,8 @@ STRIDES, SAME = (4, 16), 2e-3
 """Steps over so many messages give further guesses, if they differ by more than this share."""
 CLEAR = 0.1
 """A grid that costs no more than this is taken without a look at others."""
-BURSTS = 0.25
-"""Above this share of near-zero steps, messages arrive in bursts."""
+LITTLE, BURSTS = 0.3, 0.25
+"""Where more than a share of the steps is near zero (in periods), messages arrive in bursts."""
 LARGEST_JITTER, MOST_DISORDER = 0.25, 0.1
 """A grid with more jitter (share of the period) is believed only if almost every tick has its
 message: no more than this share lost or moved."""
@@ -67,10 +67,26 @@ def typical_step(stamps: Array) -> float:
     middle = float(np.median(steps))
     usual = steps[steps <= MAX_GAP_PERIODS * max(middle, 1e-9)] if middle > 0 else steps
     mean = float(usual.mean())
-    if np.mean(steps < 0.3 * mean) <= BURSTS:
+    if np.mean(steps < LITTLE * mean) <= BURSTS:
         return middle
     whole = steps[steps < 100.0 * float(steps.mean())]
     return float(whole.mean())
+
+
+def due(stamps: Array) -> Array:
+    """Return when messages that arrive in bursts were due [s], shape (n,).
+
+    What comes last in a burst is on time, the others had to wait for it. Stamps [s] without
+    bursts are returned as they are.
+    """
+    period = typical_step(stamps)
+    last = np.append(np.diff(stamps) >= LITTLE * period, True)
+    if 1.0 - last.mean() <= BURSTS:
+        return stamps
+    index = np.arange(stamps.size)
+    ends = np.flatnonzero(last)
+    waited = ends[np.searchsorted(ends, index)] - index
+    return np.asarray(np.maximum.accumulate(stamps - period * waited))
 
 
 def runs(stamps: Array, period: float) -> list[slice]:
@@ -134,18 +150,16 @@ def _fit(stamps: Array, period: float, first: int, fixed: bool = False) -> Grid:
     while True:
         ticks = place(stamps[:size], start, slope)
         for _ in range(2):
-            start, slope, errors = _line(ticks, stamps[:size], slope if fixed else None)
+            start, slope = _line(ticks, stamps[:size], slope if fixed else None)
             ticks = place(stamps[:size], start, slope)
         if size == stamps.size:
             break
         size = min(2 * size, stamps.size)
     errors = stamps - start - slope * ticks
-    jitter = _spread(errors)
-    lost = int(ticks[-1] - ticks[0]) + 1 - ticks.size
+    first, lost = int(ticks[0]), int(ticks[-1] - ticks[0]) + 1 - ticks.size
     moved = int((np.abs(errors) > 0.75 * slope).sum())
-    return Grid(
-        start + slope * int(ticks[0]), slope, ticks - ticks[0], jitter, (lost + moved) / ticks.size
-    )
+    disorder = (lost + moved) / ticks.size
+    return Grid(start + slope * first, slope, ticks - first, _spread(errors), disorder)
 
 
 def place(stamps: Array, start: float, period: float) -> Ticks:
@@ -189,8 +203,8 @@ def _phase(stamps: Array, period: float) -> float:
     return float(stamps[0] + period * np.angle(turns) / (2.0 * np.pi))
 
 
-def _line(ticks: Ticks, stamps: Array, slope: float | None) -> tuple[float, float, Array]:
-    """Return start and period of the line through most stamps, and the errors of all."""
+def _line(ticks: Ticks, stamps: Array, slope: float | None) -> tuple[float, float]:
+    """Return start and period of the line through the stamps; outliers are left out."""
     kept = np.ones(ticks.size, dtype=bool)
     guess = slope or 0.0
     for _ in range(2):
@@ -202,8 +216,8 @@ def _line(ticks: Ticks, stamps: Array, slope: float | None) -> tuple[float, floa
         if guess <= 0.0:
             guess = float(stamps[-1] - stamps[0]) / max(int(ticks[-1] - ticks[0]), 1) or 1.0
         errors = stamps - s_mean - guess * (ticks - t_mean)
-        kept = np.abs(errors) <= 3.0 * _spread(errors) + 1e-9
-    return float(s_mean - guess * t_mean), float(guess), errors
+        kept = np.abs(errors - np.median(errors)) <= 3.0 * _spread(errors) + 1e-9
+    return float(s_mean - guess * t_mean), float(guess)
 
 
 def _spread(errors: Array) -> float:

@@ -91,9 +91,9 @@ class McapFile:
     def _cut(self, position: int) -> None:
         """Take down that the file ends early."""
         self.damage.append(
-            f'{self.path.name} is cut off or damaged at byte {position}: what was written behind '
-            f'that is lost; "mcap recover {self.path.name} -o recovered.mcap" makes a whole file '
-            'of the rest'
+            f'{self.path.name} is cut off or damaged behind byte {position}: the messages there '
+            f'that are whole were read, the others are lost; "mcap recover {self.path.name} -o '
+            'recovered.mcap" makes a whole file of the rest'
         )
 
     def _content(self, chunk: bytes, whole: bool) -> bytes:

@@ -29,6 +29,8 @@ class SignalQuality:
     duplicates, out_of_order, surplus, zero_stamps : int
         Exact repeats dropped; messages stored after a later one and sorted back; messages
         without a tick of their own, dropped; messages without a stamp, dropped.
+    bursts : bool
+        Whether it arrived in bursts; each message then got the time at which it was due.
     jitter : float
         Robust standard deviation of the stamps about the regular grid [s].
     offset : float
@@ -44,6 +46,7 @@ class SignalQuality:
     out_of_order: int = 0
     surplus: int = 0
     zero_stamps: int = 0
+    bursts: bool = False
     jitter: float = float('nan')
     offset: float = float('nan')
     resolution: float = float('nan')
@@ -68,6 +71,8 @@ class SignalQuality:
         ):
             if count:
                 parts.append(f'{count} {words}')
+        if self.bursts:
+            parts.append('arrived in bursts, put at the times at which they were due')
         if np.isfinite(self.resolution):
             parts.append(f'resolution {self.resolution:.2g} %')
         return ', '.join(parts)
@@ -89,7 +94,10 @@ class Gap:
                 f'the clock jumped by {self.clock_jump:+.6g} s at {self.start:.6g} s; how much '
                 'time passed there is unknown, the parts are kept apart'
             )
-        return f'nothing from {self.start:.6g} s to {self.stop:.6g} s'
+        return (
+            f'nothing from {self.start:.6g} s to {self.stop:.6g} s; a command sent meanwhile is '
+            'not known'
+        )
 
 
 @dataclass(frozen=True)
@@ -156,9 +164,9 @@ class Quality:
         lines = [f'{self.samples} samples, one every {self.period:.6g} s']
         if not self.regular:
             lines.append('no regular grid fits the stamps: they are used as they are')
-        elif np.isfinite(self.fitted_period) and self.fitted_period != self.period:
+        elif abs(self.fitted_period - self.period) > 1e-7 * self.period:
             lines[0] += f' (the stamps say {self.fitted_period:.9g} s)'
-        if self.jitter > 0:
+        if self.jitter > 1e-4 * self.period:
             share = 100 * self.jitter / self.period
             lines[0] += f', jitter {milliseconds(self.jitter)} ({share:.2g} %)'
         if self.loss:
@@ -205,7 +213,7 @@ class Quality:
 
 def milliseconds(seconds: float) -> str:
     """Return a short time in words."""
-    return f'{1e3 * seconds:.3g} ms'
+    return f'{round(1e3 * seconds, 3) + 0.0:.3g} ms'
 
 
 def resolution(values: Array) -> float:

@@ -125,5 +125,8 @@ def unpacked(path: Path, folder: Path) -> tuple[Path, list[str]]:
             while block := source.read1(1 << 20):
                 target.write(block)
     except (EOFError, zstd.ZstdError) as error:
-        return plain, [f'{path.name} is cut off or damaged ({error}): its end is lost']
+        return plain, [
+            f'{path.name} is cut off or damaged ({error}): its end is lost; "zstd -dc {path.name} '
+            f'> {path.stem}" unpacks the rest'
+        ]
     return plain, []
