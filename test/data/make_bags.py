@@ -165,8 +165,8 @@ def stamps(folder: Path) -> None:
     single(folder / 'rates', float64(slow))
 
 
-def other_messages(folder: Path) -> None:
-    """Write recordings whose numbers are not in plain Float64 topics."""
+def own_message() -> Messages:
+    """Return messages of a type that only the bag defines: mA and bar instead of per cent."""
     truth, clean = recording()
     messages = [m for m in float64(clean) if m[0] == '/u']
     for k, stamp in enumerate(clean['x'].stamps):
@@ -177,8 +177,19 @@ def other_messages(folder: Path) -> None:
         pressure = [TYPES['plant_msgs/msg/Pressure'](0.2 + 0.008 * truth.p1[k], True)]
         payload = _payload(STATE, header=header, current=current, pressure=pressure)
         messages.append(('/valve/state', int(stamp), payload))
-    messages.sort(key=lambda message: message[1])
-    single(folder / 'own_message', messages, {'/valve/state': STATE})
+    return sorted(messages, key=lambda message: message[1])
+
+
+def own_message_sqlite3(path: Path) -> Path:
+    """Write them as .db3; return the file."""
+    types = {'/valve/state': STATE}
+    return bag(path, own_message(), 'sqlite3', CompressionMode.NONE, types)
+
+
+def other_messages(folder: Path) -> None:
+    """Write recordings whose numbers are not in plain Float64 topics."""
+    single(folder / 'own_message', own_message(), {'/valve/state': STATE})
+    truth, clean = recording()
     layout = TYPES['std_msgs/msg/MultiArrayLayout'](
         [TYPES['std_msgs/msg/MultiArrayDimension']('t,u,p1,x', 4, 4)], 0
     )

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The small ugly bags of test/data: one valve, recorded with one thing wrong at a time."""
 
+import functools
 import importlib.util
 from pathlib import Path
 import shutil
@@ -31,6 +32,15 @@ def outcome(path):
         return read_recording(path), ''
     except RecordingError as error:
         return None, str(error)
+
+
+@functools.cache
+def make_bags():
+    """Return the script as a module."""
+    source = importlib.util.spec_from_file_location('make_bags', DATA / 'make_bags.py')
+    module = importlib.util.module_from_spec(source)
+    source.loader.exec_module(module)
+    return module
 
 
 def notes(found):
@@ -213,9 +223,26 @@ def test_the_bags_are_small_and_all_of_them_are_made_by_the_script(tmp_path):
     kept = {p.relative_to(DATA) for p in DATA.rglob('*') if p.is_file()}
     kept = {p for p in kept if p.suffix not in ('.py', '.pyc')}
     assert sum((DATA / p).stat().st_size for p in kept) < 300_000
-    source = importlib.util.spec_from_file_location('make_bags', DATA / 'make_bags.py')
-    make_bags = importlib.util.module_from_spec(source)
-    source.loader.exec_module(make_bags)
-    make_bags.write_all(tmp_path)
+    make_bags().write_all(tmp_path)
     made = {p.relative_to(tmp_path) for p in tmp_path.rglob('*') if p.is_file()}
     assert made == kept
+
+
+def test_an_old_bag_without_definitions_takes_them_from_a_folder(truth, tmp_path):
+    path = make_bags().own_message_sqlite3(tmp_path / 'old')
+    database = sqlite3.connect(path)
+    database.execute('DELETE FROM message_definitions')
+    database.commit()
+    database.close()
+    topics = {'x': '/valve/state/current[2]*6.25-25'}
+    with pytest.raises(RecordingError, match='--msg-dir'):
+        read_recording(path, topics)
+    folder = tmp_path / 'plant_msgs' / 'msg'
+    folder.mkdir(parents=True)
+    (folder / 'ValveState.msg').write_text(make_bags().DEFINITION)
+    (folder / 'Pressure.msg').write_text(make_bags().PRESSURE)
+    (folder / 'Other.msg').write_text('not a message at all ((\n')
+    found = read_recording(path, topics, message_folders=[tmp_path / 'plant_msgs'])
+    np.testing.assert_allclose(found.x, truth.x, atol=1e-4)
+    with pytest.raises(RecordingError, match='no such folder'):
+        read_recording(path, topics, message_folders=[tmp_path / 'nowhere'])

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Recordings of a valve: ROS 2 bags and CSV files in, one `Recording` out, and back."""
 
+from collections.abc import Sequence
 import os
 from pathlib import Path
 
@@ -18,6 +19,7 @@ def read_recording(
     path: str | os.PathLike[str],
     topics: Topics | None = None,
     sample_time: float | None = None,
+    message_folders: Sequence[str | os.PathLike[str]] = (),
 ) -> Recording:
     """Read a bag (folder, .mcap or .db3 file, compressed or not) or a CSV file.
 
@@ -29,6 +31,8 @@ def read_recording(
         Topic or CSV column by signal, as ``{'x': '/valve_7/position'}``.
     sample_time : float, optional
         Sampling period of the valve [s], for bags that hold only some of its samples.
+    message_folders : sequence of path-like
+        Folders with ``PACKAGE/msg/NAME.msg`` files, for old bags that do not define their types.
 
     Raises
     ------
@@ -40,7 +44,7 @@ def read_recording(
         raise RecordingError(f'{path}: no such bag or CSV file; check the path')
     if path.suffix.lower() == '.csv':
         return read_csv(path, topics)
-    return read_bag(path, topics, sample_time=sample_time)
+    return read_bag(path, topics, sample_time=sample_time, message_folders=message_folders)
 
 
 def read_commands(path: str | os.PathLike[str], topics: Topics | None = None) -> Recording:

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """ROS 2 bags: read from their storage files, types by rosbags; written by rosbags."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 import hashlib
 import os
@@ -31,6 +31,7 @@ def read_bag(
     topics: Topics | None = None,
     require_outputs: bool = True,
     sample_time: float | None = None,
+    message_folders: Sequence[str | os.PathLike[str]] = (),
 ) -> Recording:
     """Read the signals of one valve from a bag and put them on one time axis.
 
@@ -45,6 +46,8 @@ def read_bag(
         Whether a bag that holds nothing but commands is refused.
     sample_time : float, optional
         Sampling period of the valve [s], where the outputs were recorded less often.
+    message_folders : sequence of path-like
+        Folders with .msg files, for bags that do not define their types.
 
     Raises
     ------
@@ -61,7 +64,11 @@ def read_bag(
     files = storage_files(path)
     with opened(path) as bag:
         try:
-            return _read(path, files, bag, topics, require_outputs, sample_time)
+            decoder = Decoder(
+                (c.definition for c in bag.connections.values() if c.definition.language),
+                [Path(folder) for folder in message_folders],
+            )
+            return _read(path, files, bag, decoder, topics, require_outputs, sample_time)
         except RecordingError as error:
             raise RecordingError(f'{path}: {error}') from None
 
@@ -70,6 +77,7 @@ def _read(
     path: Path,
     files: list[Path],
     bag: Bag,
+    decoder: Decoder,
     topics: Topics | None,
     require_outputs: bool,
     sample_time: float | None,
@@ -87,7 +95,6 @@ def _read(
                 ]
             )
         )
-    decoder = Decoder(c.definition for c in connections.values() if c.definition.language)
     provenance = Provenance(
         paths=(str(path),),
         digests={str(file): digest(file) for file in files},

@@ -45,21 +45,27 @@ class Decoder:
         """
         self._store = get_typestore(Stores.ROS2_JAZZY)
         types: dict[str, Any] = {}
+        self._unreadable: dict[str, str] = {}
         for folder in folders:
+            if not folder.is_dir():
+                raise RecordingError(f'{folder}: no such folder with .msg files; check the path')
             for path in sorted(folder.rglob('*.msg')):
                 name = f'{_package(path)}/msg/{path.stem}'
-                types.update(get_types_from_msg(path.read_text(encoding='utf-8'), name))
+                definition = Definition(name, 'msg', path.read_text(encoding='utf-8'))
+                self._learn(definition, types)
         for definition in definitions:
-            try:
-                types.update(_types(definition))
-            except Exception as error:  # the parser raises what it likes
-                raise RecordingError(
-                    f'the definition of {definition.msgtype} in the bag cannot be read: {error}'
-                ) from error
+            self._learn(definition, types)
         for name in types:
             if name in self._store.fielddefs and types[name][1] != self._store.fielddefs[name][1]:
                 del self._store.fielddefs[name], self._store.types[name]
         self._store.register({n: t for n, t in types.items() if n not in self._store.fielddefs})
+
+    def _learn(self, definition: Definition, types: dict[str, Any]) -> None:
+        """Add what a definition defines; one that cannot be read matters only if it is used."""
+        try:
+            types.update(_types(definition))
+        except Exception as error:  # the parser raises what it likes
+            self._unreadable[definition.msgtype] = str(error)
 
     def values(
         self, column: Column, msgtype: str, paths: Sequence[str], topic: str
@@ -108,10 +114,15 @@ class Decoder:
 
     def _reader(self, msgtype: str, path: str, topic: str) -> Callable[[Any], Any]:
         """Return a function that follows `path` in a message, after checking it by type."""
+        if msgtype in self._unreadable:
+            raise RecordingError(
+                f'topic {topic} has type {msgtype}, whose definition cannot be read: '
+                f'{self._unreadable[msgtype]}'
+            )
         if msgtype not in self._store.fielddefs:
             raise RecordingError(
-                f'topic {topic} has type {msgtype}, which the bag does not define: record '
-                'it again as mcap, which carries the definitions'
+                f'topic {topic} has type {msgtype}, which the bag does not define: give '
+                'the folder of its .msg files (message_folders, --msg-dir), or record as mcap'
             )
         fields = self.numeric_fields(msgtype)
         if re.sub(r'\[\d+\]', '[]', path) not in [re.sub(r'\[\d*\]', '[]', f) for f in fields]:
