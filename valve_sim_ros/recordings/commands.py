@@ -21,7 +21,8 @@ REACH = 8
 """Samples before and behind a command that are looked at."""
 SHIFTS = range(-1, 4)
 """Answers are looked for from one sample before to three behind the first that may show them."""
-MOST_EVENTS = 5000
+MOST_EVENTS, ENOUGH_EVENTS = 5000, 1000
+"""Commands that are looked at one by one; those that tell the offset."""
 FEWEST_ROWS = 7
 DECIDED = 8.0
 """Natural logarithm of the odds above which the outputs overrule a stamp."""
@@ -91,7 +92,8 @@ def hold(
     clear_answers = np.count_nonzero(evidence.min(axis=1, initial=0.0) < -DECIDED)
     if clear_answers < (1.0 - MOST_SILENT) * events.size:
         evidence = np.zeros_like(evidence)
-    total, spread = _best_offset(stamps[events], evidence, ticks, period, margin)
+    some = slice(None, None, max(events.size // ENOUGH_EVENTS, 1))
+    total, spread = _best_offset(stamps[events][some], evidence[some], ticks, period, margin)
     # a whole sample is a dead time wherever the data allow it: a stamp lags by less
     longest = spread[1] if np.isfinite(spread[1]) else total
     dead = max(int(np.floor(longest / period + 1e-6)), 0)
@@ -171,11 +173,16 @@ def _misfit(seen: Array, mask: npt.NDArray[np.bool_], curves: Array) -> Array:
     weight = mask.astype(float)
     mean = np.nansum(seen * weight, axis=1) / weight.sum(axis=1)
     y = np.where(mask, seen - mean[:, None], 0.0)
-    normal = np.einsum('mr,ri,rj->mij', weight, curves, curves, optimize=True)
+    errors = np.empty_like(y)
+    whole = mask.all(axis=1)
+    # rows without a lost sample share one projection
+    errors[whole] = y[whole] - y[whole] @ (np.linalg.pinv(curves).T @ curves.T)
+    w, rest = weight[~whole], y[~whole]
+    normal = np.einsum('mr,ri,rj->mij', w, curves, curves, optimize=True)
     normal += 1e-9 * np.eye(curves.shape[1])
-    found = np.linalg.solve(normal, (y @ curves)[:, :, None])[:, :, 0]
-    error = weight * (y - found @ curves.T)
-    return np.asarray((error**2).sum(axis=1))
+    found = np.linalg.solve(normal, (rest @ curves)[:, :, None])[:, :, 0]
+    errors[~whole] = w * (rest - found @ curves.T)
+    return np.asarray((errors**2).sum(axis=1))
 
 
 def _best_offset(

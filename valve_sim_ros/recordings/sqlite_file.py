@@ -4,6 +4,7 @@
 
 from collections import Counter
 from collections.abc import Iterator, Mapping
+from itertools import islice
 from pathlib import Path
 import shutil
 import sqlite3
@@ -46,6 +47,30 @@ class SqliteFile:
     def read(self, columns: Mapping[int, Column]) -> None:
         """Append the messages of some connections to their columns, in stored order."""
         self.damage = self._cut()
+        before = {key: len(column) for key, column in columns.items()}
+        try:
+            for key, column in columns.items():
+                self._read_topic(key, column)
+        except sqlite3.DatabaseError:
+            for key, column in columns.items():
+                column.truncate(before[key])
+            self._read_what_is_left(columns)
+
+    def _read_topic(self, key: int, column: Column) -> None:
+        """Append the messages of one topic; a scan for each is faster than sorting one scan."""
+        query = 'SELECT timestamp, data FROM messages WHERE topic_id = ? ORDER BY id'
+        rows = self._database.execute(query, (key,))
+        stamps, payloads = column.stamps, column.payloads
+        while True:
+            for stamp, payload in islice(rows, BLOCK):
+                stamps.append(stamp)
+                payloads.append(payload)
+            if not stamps:
+                return
+            column.pack()
+
+    def _read_what_is_left(self, columns: Mapping[int, Column]) -> None:
+        """Append the messages of a damaged file that can still be had."""
         wanted = ','.join(str(int(key)) for key in columns) or 'NULL'
         query = (
             'SELECT topic_id, timestamp, data, id FROM messages '
@@ -53,9 +78,8 @@ class SqliteFile:
         )
         for block in self._blocks(query):
             for key, stamp, payload, _ in block:
-                column = columns[key]
-                column.stamps.append(stamp)
-                column.payloads.append(payload)
+                columns[key].stamps.append(stamp)
+                columns[key].payloads.append(payload)
             for column in columns.values():
                 column.pack()
 
@@ -113,9 +137,13 @@ class SqliteFile:
         }
 
     def _counts(self) -> Mapping[int, int]:
-        """Return the messages by topic, as far as they can be counted."""
+        """Tell which topics have messages: counting them all would take as long as reading."""
         try:
-            return dict(self._rows('SELECT topic_id, count(*) FROM messages GROUP BY topic_id'))
+            query = 'SELECT EXISTS(SELECT 1 FROM messages WHERE topic_id = ?)'
+            return {
+                key: int(self._database.execute(query, (key,)).fetchone()[0])
+                for key in self.connections
+            }
         except sqlite3.DatabaseError:
             self.damage = self._cut()
             query = 'SELECT topic_id, id FROM messages WHERE id > ? ORDER BY id'

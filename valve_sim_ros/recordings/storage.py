@@ -59,16 +59,20 @@ class Column:
 
     def pack(self) -> None:
         """Pack what has come since the last call; undo compression of single messages."""
-        if any(payload[:4] == ZSTD_MAGIC for payload in self.payloads):
-            self.payloads = [
-                zstd.decompress(payload) if payload[:4] == ZSTD_MAGIC else payload
-                for payload in self.payloads
-            ]
+        if self.payloads and self.payloads[0][:4] == ZSTD_MAGIC:  # all of a file are, or none
+            self.payloads = [zstd.decompress(payload) for payload in self.payloads]
         self.packed_stamps.extend(self.stamps)
         self.packed += b''.join(self.payloads)
         self.sizes.extend(map(len, self.payloads))
         self.stamps.clear()
         self.payloads.clear()
+
+    def truncate(self, count: int) -> None:
+        """Keep only the first messages, packed ones."""
+        self.stamps.clear()
+        self.payloads.clear()
+        del self.packed[sum(self.sizes[:count]) :]
+        del self.packed_stamps[count:], self.sizes[count:]
 
     def messages(self) -> Iterator[bytes]:
         """Yield the packed payloads one by one."""
@@ -99,7 +103,7 @@ class StorageFile(Protocol):
 
     @property
     def counts(self) -> Mapping[int, int]:
-        """Messages by the same id."""
+        """Messages by the same id; for sqlite3 only whether there are any, 1 or 0."""
 
     def read(self, columns: Mapping[int, Column]) -> None:
         """Append the messages of some connections to their columns, in stored order."""
