@@ -76,6 +76,7 @@ setup(
             'valve_twin = valve_sim_ros.nodes.start:valve_twin',
             'pi_controller = valve_sim_ros.nodes.start:pi_controller',
             'valve_identifier = valve_sim_ros.nodes.start:valve_identifier',
+            'signal_player = valve_sim_ros.nodes.start:signal_player',
             'valve_sim = valve_sim_ros.cli:main',
         ],
     },

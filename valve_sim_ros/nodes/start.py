@@ -67,3 +67,8 @@ def valve_twin() -> None:
 def valve_identifier() -> None:
     """Run the identifier."""
     _run('valve_identifier')
+
+
+def signal_player() -> None:
+    """Play the commands of a file."""
+    _run('signal_player')

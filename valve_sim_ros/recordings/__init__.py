@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Recordings of a valve: ROS 2 bags and CSV files in, one `Recording` out, and back."""
 
+from collections.abc import Sequence
 import os
 from pathlib import Path
 
@@ -14,8 +15,13 @@ from .topics import Topics
 __all__ = ['Recording', 'RecordingError', 'read_commands', 'read_recording', 'write_recording']
 
 
-def read_recording(path: str | os.PathLike[str], topics: Topics | None = None) -> Recording:
-    """Read a bag (folder, .mcap or .db3 file) or a CSV file.
+def read_recording(
+    path: str | os.PathLike[str],
+    topics: Topics | None = None,
+    sample_time: float | None = None,
+    message_folders: Sequence[str | os.PathLike[str]] = (),
+) -> Recording:
+    """Read a bag (folder, .mcap or .db3 file, compressed or not) or a CSV file.
 
     Parameters
     ----------
@@ -23,6 +29,10 @@ def read_recording(path: str | os.PathLike[str], topics: Topics | None = None) -
         What to read.
     topics : mapping of str to str, optional
         Topic or CSV column by signal, as ``{'x': '/valve_7/position'}``.
+    sample_time : float, optional
+        Sampling period of the valve [s], for bags that hold only some of its samples.
+    message_folders : sequence of path-like
+        Folders with ``PACKAGE/msg/NAME.msg`` files, for old bags that do not define their types.
 
     Raises
     ------
@@ -32,7 +42,9 @@ def read_recording(path: str | os.PathLike[str], topics: Topics | None = None) -
     path = Path(path)
     if not path.exists():
         raise RecordingError(f'{path}: no such bag or CSV file; check the path')
-    return read_csv(path, topics) if path.suffix.lower() == '.csv' else read_bag(path, topics)
+    if path.suffix.lower() == '.csv':
+        return read_csv(path, topics)
+    return read_bag(path, topics, sample_time=sample_time, message_folders=message_folders)
 
 
 def read_commands(path: str | os.PathLike[str], topics: Topics | None = None) -> Recording:

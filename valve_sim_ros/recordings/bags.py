@@ -1,113 +1,159 @@
 # Copyright 2026 The valve_sim_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""ROS 2 bags (mcap and sqlite3) through rosbags."""
+"""ROS 2 bags: read from their storage files, types by rosbags; written by rosbags."""
 
-from collections import Counter
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 import hashlib
 import os
 from pathlib import Path
 import shutil
 
 import numpy as np
-from rosbags.rosbag2 import Reader, ReaderError, StoragePlugin, Writer
+from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import get_typestore, Stores
 
 from .align import align, Arrivals
+from .bag_files import Bag, opened, storage_files
 from .errors import RecordingError
-from .fields import Decoder, Definition, FLOAT64
+from .fields import Decoder, FLOAT64
 from .recording import Provenance, Recording, refuse_not_finite
-from .topics import select, Topics
+from .samples import from_samples, sample_topic
+from .storage import CDR, Column, Connection
+from .topics import select, Topics, TopicSelection
 
 STORAGES = {'mcap': StoragePlugin.MCAP, 'sqlite3': StoragePlugin.SQLITE3}
 FEWEST_MESSAGES = 10
 
 
 def read_bag(
-    path: str | os.PathLike[str], topics: Topics | None = None, require_outputs: bool = True
+    path: str | os.PathLike[str],
+    topics: Topics | None = None,
+    require_outputs: bool = True,
+    sample_time: float | None = None,
+    message_folders: Sequence[str | os.PathLike[str]] = (),
 ) -> Recording:
     """Read the signals of one valve from a bag and put them on one time axis.
 
     Parameters
     ----------
     path : path-like
-        Bag folder (with or without metadata.yaml), or a single .mcap or .db3 file.
+        Bag folder (with or without metadata.yaml), or a single storage file, compressed or not.
     topics : mapping of str to str or TopicSelection, optional
-        Topic by signal; by default the topics whose names end in u, p1, p2, x.
+        Topic by signal; by default the plant's self-consistent ``~/sample`` if it was recorded,
+        else the topics whose names end in u, p1, p2, x.
     require_outputs : bool
         Whether a bag that holds nothing but commands is refused.
+    sample_time : float, optional
+        Sampling period of the valve [s], where the outputs were recorded less often.
+    message_folders : sequence of path-like
+        Folders with .msg files, for bags that do not define their types.
 
     Raises
     ------
     RecordingError
-        If the bag is missing, damaged or empty, a topic is missing or carries no numbers, or a
-        value is not finite.
+        If the bag is missing or empty, nothing can be recovered from it, a topic is missing or
+        carries no numbers, or a value is not finite.
+
+    Notes
+    -----
+    What is there is read; what is lost is said in the recording's quality, with the command that
+    repairs the bag.
     """
     path = Path(path)
     files = storage_files(path)
-    opened = [path] if path.is_file() or (path / 'metadata.yaml').exists() else files
-    stamps: dict[str, list[int]] = {}
-    payloads: dict[str, list[bytes]] = {}
-    types: dict[str, str] = {}
-    definitions: dict[str, Definition] = {}
-    with _explained(path):
-        for part in opened:
-            with Reader(part) as reader:
-                counts: Counter[str] = Counter()
-                for connection in reader.connections:
-                    counts[connection.topic] += connection.msgcount
-                    types[connection.topic] = connection.msgtype
-                    definitions[connection.msgtype] = Definition(
-                        connection.msgtype,
-                        {1: 'msg', 2: 'idl'}.get(int(connection.msgdef.format.value), ''),
-                        connection.msgdef.data,
-                    )
-                if not sum(counts.values()):
-                    continue
-                chosen_topics = {s.topic for s in select(topics, counts, False).values()}
-                wanted = [c for c in reader.connections if c.topic in chosen_topics]
-                for connection, stamp, payload in reader.messages(wanted):
-                    stamps.setdefault(connection.topic, []).append(stamp)
-                    payloads.setdefault(connection.topic, []).append(bytes(payload))
-    if not stamps:
+    with opened(path) as bag:
+        try:
+            decoder = Decoder(
+                (c.definition for c in bag.connections.values() if c.definition.language),
+                [Path(folder) for folder in message_folders],
+            )
+            return _read(path, files, bag, decoder, topics, require_outputs, sample_time)
+        except RecordingError as error:
+            raise RecordingError(f'{path}: {error}') from None
+
+
+def _read(
+    path: Path,
+    files: list[Path],
+    bag: Bag,
+    decoder: Decoder,
+    topics: Topics | None,
+    require_outputs: bool,
+    sample_time: float | None,
+) -> Recording:
+    """Read an open bag."""
+    counts, connections = bag.counts, bag.connections
+    if not counts.total():
         raise RecordingError(
-            f'{path}: the bag holds no message (topics: {", ".join(types) or "none"}); record it '
-            'again while the valve and its command source run'
-        )
-    try:
-        available = {topic: len(stamps.get(topic, ())) for topic in types}
-        selections = select(topics, available, require_outputs)
-        decoder = Decoder(d for d in definitions.values() if d.language)
-        arrivals = {}
-        for name, chosen in selections.items():
-            raw = decoder.values(
-                payloads[chosen.topic], types[chosen.topic], chosen.field, chosen.topic
+            '; '.join(
+                [
+                    f'the bag holds no message (topics: {", ".join(connections) or "none"}); '
+                    'record it again while the valve and its command source run',
+                    *bag.notes,
+                    *(sentence for file in bag.files for sentence in file.damage),
+                ]
             )
-            values = chosen.scale * raw + chosen.offset
-            received = np.array(stamps[chosen.topic], dtype=np.int64)
-            refuse_not_finite(name, values, (received - received[0]) * 1e-9)
-            arrivals[name] = Arrivals(received, values)
-        messages = max(
-            a.stamps.size for name, a in arrivals.items() if name != 'u' or len(arrivals) == 1
         )
-        if messages < FEWEST_MESSAGES:
+    provenance = Provenance(
+        paths=(str(path),),
+        digests={str(file): digest(file) for file in files},
+        time_source='received',
+        storage='mcap' if '.mcap' in files[0].name else 'sqlite3',
+        reader='valve_sim_ros',
+    )
+    sampled = sample_topic(topics, connections, counts)
+    if sampled:
+        columns, notes = bag.read({sampled})
+        rows = decoder.rows(columns[sampled], sampled)
+        provenance = replace(
+            provenance, topics={'t, u, p1, p2, x': sampled}, time_source='field t'
+        )
+        return from_samples(*rows, columns[sampled].packed_stamps, sampled, provenance, notes)
+    selections = select(topics, counts, require_outputs)
+    columns, notes = bag.read({chosen.topic for chosen in selections.values()})
+    arrivals = _arrivals(selections, columns, connections, decoder)
+    commands_only = not require_outputs and len(selections) == 1
+    messages = max(
+        (each.stamps.size for name, each in arrivals.items() if name != 'u' or commands_only),
+        default=0,
+    )
+    if messages < FEWEST_MESSAGES:
+        raise RecordingError(
+            '; '.join([f'only {messages} messages per output: record at least 10 samples', *notes])
+        )
+    provenance = replace(
+        provenance, topics={name: chosen.text() for name, chosen in selections.items()}
+    )
+    return align(arrivals, provenance, notes, sample_time)
+
+
+def _arrivals(
+    selections: Mapping[str, TopicSelection],
+    columns: Mapping[str, Column],
+    connections: Mapping[str, Connection],
+    decoder: Decoder,
+) -> dict[str, Arrivals]:
+    """Decode each topic once and return stamps and values by signal."""
+    arrivals = {}
+    for topic, column in columns.items():
+        names = [name for name, chosen in selections.items() if chosen.topic == topic]
+        connection = connections[topic]
+        if connection.encoding != CDR:
             raise RecordingError(
-                f'only {messages} messages per output; record at least 10 samples'
+                f'topic {topic} is encoded as {connection.encoding!r}, not as ROS 2 messages '
+                f'({CDR}): convert the recording first'
             )
-        return align(
-            arrivals,
-            Provenance(
-                paths=(str(path),),
-                digests={str(file): _digest(file) for file in files},
-                topics={name: chosen.text() for name, chosen in selections.items()},
-                time_source='received',
-                storage='mcap' if files[0].suffix == '.mcap' else 'sqlite3',
-                reader='rosbags',
-            ),
-        )
-    except RecordingError as error:
-        raise RecordingError(f'{path}: {error}') from None
+        stamps = np.array(column.packed_stamps, dtype=np.int64)
+        fields = [selections[name].field for name in names]
+        decoded = decoder.values(column, connection.definition.msgtype, fields, topic)
+        for name, raw in zip(names, decoded, strict=True):
+            values = selections[name].scale * raw + selections[name].offset
+            refuse_not_finite(
+                name, values, 1e-9 * np.asarray(stamps - stamps[:1], dtype=np.float64)
+            )
+            arrivals[name] = Arrivals(stamps, values)
+    return {name: arrivals[name] for name in selections if arrivals[name].stamps.size}
 
 
 def write_bag(recording: Recording, path: str | os.PathLike[str], storage: str = 'mcap') -> None:
@@ -154,47 +200,10 @@ def write_bag(recording: Recording, path: str | os.PathLike[str], storage: str =
     aside.parent.rmdir()
 
 
-def storage_files(path: Path) -> list[Path]:
-    """Return the storage files of a bag, or say why there are none."""
-    if not path.exists():
-        raise RecordingError(f'{path}: no such bag; check the path')
-    if path.is_file():
-        if path.suffix not in ('.mcap', '.db3'):
-            raise RecordingError(
-                f'{path}: expected a bag folder, an .mcap, a .db3 or a .csv file'
-                + ('; give the folder of a compressed bag' if path.suffix == '.zstd' else '')
-            )
-        return [path]
-    files = sorted(file for file in path.iterdir() if set(file.suffixes) & {'.mcap', '.db3'})
-    if not files:
-        raise RecordingError(
-            f'{path}: an empty folder or no bag: expected .mcap or .db3 files and metadata.yaml'
-        )
-    return files
-
-
-@contextmanager
-def _explained(path: Path) -> Iterator[None]:
-    """Turn what rosbags raises on damage into a sentence with the cure."""
-    try:
-        yield
-    except RecordingError as error:
-        raise RecordingError(f'{path}: {error}') from None
-    except (ReaderError, OSError, ValueError, KeyError, AssertionError) as error:
-        raise RecordingError(
-            f'{path}: damaged or cut off ({error}); repair it first: '
-            '"mcap recover IN.mcap -o OUT.mcap" for mcap, "sqlite3 IN.db3 .recover" for sqlite3, '
-            '"ros2 bag reindex FOLDER" if metadata.yaml is damaged'
-        ) from None
-
-
-def _digest(path: Path) -> str:
+def digest(path: Path) -> str:
     """Return the SHA-256 of a file."""
     digest = hashlib.sha256()
     with path.open('rb') as file:
         for block in iter(lambda: file.read(1 << 20), b''):
             digest.update(block)
     return digest.hexdigest()
-
-
-__all__: Sequence[str] = ['read_bag', 'storage_files', 'write_bag']

@@ -3,7 +3,6 @@
 """Numbers out of messages, by the type definitions the bag carries itself."""
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 import re
 from typing import Any
@@ -13,19 +12,22 @@ from rosbags.typesys import get_types_from_idl, get_types_from_msg, get_typestor
 
 from .errors import RecordingError
 from .quality import Array
+from .storage import Column, Definition
 
 FLOAT64 = 'std_msgs/msg/Float64'
+MULTI_ARRAY = 'std_msgs/msg/Float64MultiArray'
+BUILT_IN = get_typestore(Stores.ROS2_JAZZY)
 STEP = re.compile(r'([A-Za-z_]\w*)((?:\[\d+\])*)')
+PLAIN = np.dtype(
+    {
+        'names': ['order', 'little', 'big'],
+        'formats': ['u1', '<f8', '>f8'],
+        'offsets': [1, 4, 4],
+        'itemsize': 12,
+    }
+)
+"""A serialised Float64, read in either byte order."""
 IDL_SEPARATOR = '=' * 80 + '\nIDL: '
-
-
-@dataclass(frozen=True)
-class Definition:
-    """The definition of a message type as a bag stores it; language is 'msg', 'idl' or ''."""
-
-    msgtype: str
-    language: str
-    text: str
 
 
 class Decoder:
@@ -43,24 +45,32 @@ class Decoder:
         """
         self._store = get_typestore(Stores.ROS2_JAZZY)
         types: dict[str, Any] = {}
+        self._unreadable: dict[str, str] = {}
         for folder in folders:
+            if not folder.is_dir():
+                raise RecordingError(f'{folder}: no such folder with .msg files; check the path')
             for path in sorted(folder.rglob('*.msg')):
                 name = f'{_package(path)}/msg/{path.stem}'
-                types.update(get_types_from_msg(path.read_text(encoding='utf-8'), name))
+                definition = Definition(name, 'msg', path.read_text(encoding='utf-8'))
+                self._learn(definition, types)
         for definition in definitions:
-            try:
-                types.update(_types(definition))
-            except Exception as error:  # the parser raises what it likes
-                raise RecordingError(
-                    f'the definition of {definition.msgtype} in the bag cannot be read: {error}'
-                ) from error
+            self._learn(definition, types)
         for name in types:
             if name in self._store.fielddefs and types[name][1] != self._store.fielddefs[name][1]:
                 del self._store.fielddefs[name], self._store.types[name]
         self._store.register({n: t for n, t in types.items() if n not in self._store.fielddefs})
 
-    def values(self, payloads: Sequence[bytes], msgtype: str, path: str, topic: str) -> Array:
-        """Return the number at `path` of every message, shape (n,).
+    def _learn(self, definition: Definition, types: dict[str, Any]) -> None:
+        """Add what a definition defines; one that cannot be read matters only if it is used."""
+        try:
+            types.update(_types(definition))
+        except Exception as error:  # the parser raises what it likes
+            self._unreadable[definition.msgtype] = str(error)
+
+    def values(
+        self, column: Column, msgtype: str, paths: Sequence[str], topic: str
+    ) -> list[Array]:
+        """Return the numbers at some paths of every message, each shape (n,).
 
         Raises
         ------
@@ -68,26 +78,30 @@ class Decoder:
             If the type is unknown, has no such field, the field is no number, or a message is
             damaged.
         """
-        if msgtype == FLOAT64 and path == 'data':
-            fast = float64_values(payloads)
+        if msgtype == FLOAT64 and set(paths) == {'data'} and self._is_plain(FLOAT64):
+            fast = float64_values(column)
             if fast is not None:
-                return fast
-        read = self._reader(msgtype, path, topic)
-        numbers = np.empty(len(payloads))
-        for k, payload in enumerate(payloads):
+                return [fast] * len(paths)
+        readers = [self._reader(msgtype, path, topic) for path in paths]
+        numbers = [np.empty(len(column)) for _ in paths]
+        for k, payload in enumerate(column.messages()):
             message = self._message(payload, msgtype, topic, k)
-            numbers[k] = as_number(read(message), f'{topic}.{path}', msgtype)
+            for path, read, values in zip(paths, readers, numbers, strict=True):
+                values[k] = as_number(read(message), f'{topic}.{path}', msgtype)
         return numbers
 
-    def header_stamps(self, payloads: Sequence[bytes], msgtype: str, topic: str) -> list[int]:
-        """Return ``header.stamp`` of every message [ns]; RecordingError if there is none."""
-        seconds = self._reader(msgtype, 'header.stamp.sec', topic)
-        fraction = self._reader(msgtype, 'header.stamp.nanosec', topic)
-        stamps = []
-        for k, payload in enumerate(payloads):
-            message = self._message(payload, msgtype, topic, k)
-            stamps.append(int(seconds(message)) * 10**9 + int(fraction(message)))
-        return stamps
+    def rows(self, column: Column, topic: str) -> tuple[str, list[Array]]:
+        """Return the label and the rows of std_msgs/msg/Float64MultiArray messages."""
+        label, rows = '', []
+        for k, payload in enumerate(column.messages()):
+            message = self._message(payload, MULTI_ARRAY, topic, k)
+            label = label or (message.layout.dim[0].label if message.layout.dim else '')
+            rows.append(np.asarray(message.data, dtype=np.float64))
+        return label, rows
+
+    def _is_plain(self, msgtype: str) -> bool:
+        """Tell whether the bag means by a type what everyone means by it."""
+        return bool(self._store.fielddefs[msgtype][1] == BUILT_IN.fielddefs[msgtype][1])
 
     def _message(self, payload: bytes, msgtype: str, topic: str, k: int) -> Any:
         try:
@@ -100,10 +114,15 @@ class Decoder:
 
     def _reader(self, msgtype: str, path: str, topic: str) -> Callable[[Any], Any]:
         """Return a function that follows `path` in a message, after checking it by type."""
+        if msgtype in self._unreadable:
+            raise RecordingError(
+                f'topic {topic} has type {msgtype}, whose definition cannot be read: '
+                f'{self._unreadable[msgtype]}'
+            )
         if msgtype not in self._store.fielddefs:
             raise RecordingError(
-                f'topic {topic} has type {msgtype}, which the bag does not define: record '
-                'it again as mcap, which carries the definitions'
+                f'topic {topic} has type {msgtype}, which the bag does not define: give '
+                'the folder of its .msg files (message_folders, --msg-dir), or record as mcap'
             )
         fields = self.numeric_fields(msgtype)
         if re.sub(r'\[\d+\]', '[]', path) not in [re.sub(r'\[\d*\]', '[]', f) for f in fields]:
@@ -152,23 +171,21 @@ class Decoder:
         return [f'[]{rest}' for rest in self._leaves(detail[0], depth)]
 
 
-def float64_values(payloads: Sequence[bytes]) -> Array | None:
-    """Return the numbers of std_msgs/msg/Float64 payloads, or None if they are not all plain.
+def float64_values(column: Column) -> Array | None:
+    """Return the numbers of std_msgs/msg/Float64 messages, or None if they are not all plain.
 
     A payload is four bytes of CDR header, the second of them odd for little-endian, and the
     double.
     """
-    if not payloads:
+    if not len(column):
         return np.empty(0)
-    sizes = {len(payload) for payload in payloads}
-    if sizes != {12}:
+    if set(column.sizes) != {12}:
         return None
-    table = np.frombuffer(b''.join(payloads), dtype=np.uint8).reshape(-1, 12)
-    little = table[:, 1] % 2 == 1
-    numbers = np.ascontiguousarray(table[:, 4:])
-    if little.all():
-        return numbers.view('<f8')[:, 0].astype(np.float64)
-    return np.where(little, numbers.view('<f8')[:, 0], numbers.view('>f8')[:, 0])
+    table = np.frombuffer(column.packed, dtype=PLAIN)
+    if (table['order'] == 1).all():
+        return table['little'].astype(np.float64)
+    little = table['order'] % 2 == 1
+    return np.where(little, table['little'], table['big']).astype(np.float64)
 
 
 def as_number(value: Any, where: str, msgtype: str) -> float:

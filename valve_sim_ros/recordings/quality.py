@@ -29,11 +29,12 @@ class SignalQuality:
     duplicates, out_of_order, surplus, zero_stamps : int
         Exact repeats dropped; messages stored after a later one and sorted back; messages
         without a tick of their own, dropped; messages without a stamp, dropped.
+    bursts : bool
+        Whether it arrived in bursts; each message then got the time at which it was due.
     jitter : float
         Robust standard deviation of the stamps about the regular grid [s].
     offset : float
-        Median stamp relative to the reference output of the same sample [s]; for u: median time
-        from a command to the tick that used it [s].
+        Median stamp relative to the grid of the samples [s].
     resolution : float
         Smallest step between two different values [% of span]; NaN for a constant.
     """
@@ -45,6 +46,7 @@ class SignalQuality:
     out_of_order: int = 0
     surplus: int = 0
     zero_stamps: int = 0
+    bursts: bool = False
     jitter: float = float('nan')
     offset: float = float('nan')
     resolution: float = float('nan')
@@ -69,6 +71,8 @@ class SignalQuality:
         ):
             if count:
                 parts.append(f'{count} {words}')
+        if self.bursts:
+            parts.append('arrived in bursts, put at the times at which they were due')
         if np.isfinite(self.resolution):
             parts.append(f'resolution {self.resolution:.2g} %')
         return ', '.join(parts)
@@ -90,7 +94,10 @@ class Gap:
                 f'the clock jumped by {self.clock_jump:+.6g} s at {self.start:.6g} s; how much '
                 'time passed there is unknown, the parts are kept apart'
             )
-        return f'nothing from {self.start:.6g} s to {self.stop:.6g} s'
+        return (
+            f'nothing from {self.start:.6g} s to {self.stop:.6g} s; a command sent meanwhile is '
+            'not known'
+        )
 
 
 @dataclass(frozen=True)
@@ -117,6 +124,15 @@ class Quality:
         Samples dropped because no command was known yet.
     ambiguous_commands : int
         Commands so close to a tick that their sample is in doubt.
+    decided_commands : int
+        Such commands whose sample the outputs themselves decided.
+    command_offset : float
+        How much later the outputs are stamped than u [s], always less than a sample.
+    command_offset_range : tuple of float
+        All offsets that explain the outputs as well [s]; NaN if the data cannot tell.
+    dead_samples : int
+        Whole samples by which the outputs answer later still: a dead time of the valve, which
+        stays in the data.
     notes : tuple of str
         Anything else worth a sentence.
     """
@@ -130,6 +146,10 @@ class Quality:
     signals: Mapping[str, SignalQuality] = field(default_factory=dict)
     head_trimmed: int = 0
     ambiguous_commands: int = 0
+    decided_commands: int = 0
+    command_offset: float = float('nan')
+    command_offset_range: tuple[float, float] = (float('nan'), float('nan'))
+    dead_samples: int = 0
     notes: tuple[str, ...] = ()
 
     @property
@@ -144,9 +164,9 @@ class Quality:
         lines = [f'{self.samples} samples, one every {self.period:.6g} s']
         if not self.regular:
             lines.append('no regular grid fits the stamps: they are used as they are')
-        elif np.isfinite(self.fitted_period) and self.fitted_period != self.period:
+        elif abs(self.fitted_period - self.period) > 1e-7 * self.period:
             lines[0] += f' (the stamps say {self.fitted_period:.9g} s)'
-        if self.jitter > 0:
+        if self.jitter > 1e-4 * self.period:
             share = 100 * self.jitter / self.period
             lines[0] += f', jitter {milliseconds(self.jitter)} ({share:.2g} %)'
         if self.loss:
@@ -155,6 +175,7 @@ class Quality:
         lines += [f'gap: {gap.text()}' for gap in self.gaps]
         if self.head_trimmed:
             lines.append(f'{self.head_trimmed} samples before the first command left out')
+        lines += self._timing()
         if self.ambiguous_commands:
             lines.append(
                 f'{self.ambiguous_commands} commands lie so close to a sample that they may '
@@ -162,10 +183,37 @@ class Quality:
             )
         return lines + list(self.notes)
 
+    def _timing(self) -> list[str]:
+        """Return what is known about the time between u and the outputs, in words."""
+        if not np.isfinite(self.command_offset):
+            return []
+        low, high = self.command_offset_range
+        if np.isfinite(low):
+            lines = [
+                f'offset of the outputs against u: {milliseconds(self.command_offset)} (from '
+                f'{milliseconds(low)} to {milliseconds(high)} fits as well)'
+            ]
+        else:
+            lines = [
+                f'offset of the outputs against u: {milliseconds(self.command_offset)} assumed, '
+                'the data cannot tell'
+            ]
+        if self.dead_samples:
+            lines.append(
+                f'the outputs answer {self.dead_samples} samples later than stamps explain: a '
+                'dead time of the valve'
+            )
+        if self.decided_commands:
+            lines.append(
+                f'{self.decided_commands} commands near a tick were put to the sample at which '
+                'the outputs answer'
+            )
+        return lines
+
 
 def milliseconds(seconds: float) -> str:
     """Return a short time in words."""
-    return f'{round(1e3 * seconds, 6):.3g} ms'
+    return f'{round(1e3 * seconds, 3) + 0.0:.3g} ms'
 
 
 def resolution(values: Array) -> float:
