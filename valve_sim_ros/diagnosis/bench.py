@@ -117,7 +117,7 @@ class Stretch:
             scales[name][rows] = 1.0 / self.noise[name]
         return Grid(
             np.concatenate([seen, self.u[changed]])[order],
-            np.diff(time[order], prepend=time[order][:1]),
+            np.round(np.diff(time[order], prepend=time[order][:1]), 9),  # equal steps stay equal
             rows,
             forced,
             targets,
@@ -273,6 +273,12 @@ class Bench:
         )
         first = int(known[np.argmax(moved)]) + 10 if moved.any() else 0
         return min(first, int(MOST_UNSETTLED * values.size))
+
+    @property
+    def range_of_u(self) -> tuple[float, float]:
+        """Lowest and highest command [% of span]."""
+        u = self.joined('u')
+        return float(u.min()), float(u.max())
 
     def _noise(self, name: str) -> float:
         """Return the noise of a signal [% of span] from its second differences, robustly."""

@@ -31,7 +31,7 @@ GRID: dict[str, tuple[float, ...]] = {
     'T_g1': (0.7, 2.5, 8.0, 25.0),
     'T_g2': (0.7, 2.5, 8.0, 25.0),
     'f_s': (0.5, 1.5, 3.5, 7.0, 12.0),
-    'f_d/f_s': (0.35, 0.75),
+    'f_d/f_s': (0.3, 0.55, 0.8),
 }
 """Where the search for the base valve starts."""
 
@@ -45,7 +45,9 @@ SPREAD = 5.0
 POPULATION = 14
 ROUNDS = ((40, 5), (10, 14), (4, 30))
 """Rounds of a race where costs are rugged: how many still run, and for how many generations."""
-FINISHERS = 5
+MOST_STARTS = 24
+"""Up to so many starts of an effect are tried with each level of friction."""
+SCREENED, FINISHERS, REFINED = 3, 5, 2
 """ So many are refitted to the end."""
 
 
@@ -66,6 +68,7 @@ class Fitter:
 
     bench: Bench
     phase: Unknown = PHASE
+    drive: tuple[str, ...] = ()
     seed: int = 0
     evaluations: int = 0
 
@@ -74,11 +77,16 @@ class Fitter:
         return group.unknowns(len(self.bench.stretches), self.phase)
 
     def residuals(
-        self, valve: Valve, signal: str, drive: Sequence[str] = (), coarse: float = 0.0
+        self,
+        valve: Valve,
+        signal: str,
+        drive: Sequence[str] | None = None,
+        coarse: float = COARSE,
     ) -> Array:
         """Return the residuals of a signal over its noise, 0 where they do not count."""
         self.evaluations += 1
-        results = self.bench.run(complete(valve.values), valve.effects, drive, coarse)
+        driven = self.drive if drive is None else drive
+        results = self.bench.run(complete(valve.values), valve.effects, driven, coarse)
         return np.nan_to_num(self.bench.residual(results, signal))
 
     def score(
@@ -159,7 +167,8 @@ class Fitter:
         """Return a valve after descents and, where costs are rugged, evolutions in turn."""
         valve = self.fit(valve, problem)
         while 'f_s' in (unknown.name for unknown in problem[0]):
-            more = self.fit(self.evolve(valve, problem, 30, spread=2.0, coarse=COARSE), problem)
+            more = self.evolve(valve, problem, 40, spread=3.0, coarse=COARSE)
+            more = self.fit(more, problem)
             if more.cost > 0.99 * valve.cost:
                 return min(valve, more, key=_cost)
             valve = more
@@ -180,7 +189,7 @@ class Fitter:
             If there are no candidates.
         """
         rugged = 'p2-x' in group.stages
-        residual = self.residuals(valve, group.signal) if rugged else np.zeros(0)
+        residual = self.residuals(valve, group.signal, self.drive) if rugged else np.zeros(0)
         runners = []
         for index, candidate in enumerate(candidates):
             runners.append(self._screen(candidate, group, valve, residual))
@@ -196,8 +205,8 @@ class Fitter:
             runners[index] = self.fit(runner, self.problem(group, runner))
             progress(0.5 + 0.5 * (index + 1) / FINISHERS)
         runners = sorted(runners, key=_cost)
-        if rugged:
-            runners[0] = self.refined(runners[0], self.problem(group, runners[0]))
+        for index, runner in enumerate(runners[:REFINED] if rugged else ()):
+            runners[index] = self.refined(runner, self.problem(group, runner))
         return sorted(runners, key=_cost)
 
     def rebased(self, group: Group, valve: Valve, runners: Sequence[Valve]) -> Valve:
@@ -208,13 +217,13 @@ class Fitter:
             replace(valve, values={**valve.values, **{name: r.values[name] for name in names}})
             for r in runners
         ]
-        costs = [self.score(each, group.signal, (), COARSE) for each in there]
+        costs = [self.score(each, group.signal, self.drive, COARSE) for each in there]
         best = there[int(np.argmin(costs))]
         return min(valve, self.fit(best, problem), key=_cost)
 
     def problem(self, group: Group, valve: Valve) -> 'Problem':
-        """Return what a refit of a valve varies in a group, driven by the model itself."""
-        return (*self.unknowns(group), *valve.freed), group.signal, ()
+        """Return what a refit of a valve varies in a group, driven as is usual here."""
+        return (*self.unknowns(group), *valve.freed), group.signal, self.drive
 
     @property
     def phase_start(self) -> float:
@@ -229,23 +238,25 @@ class Fitter:
             freed=(*valve.freed, *candidate.unknowns),
             candidates=(*valve.candidates, candidate),
         )
-        starts = [
-            {**candidate.neutral, **valve.values, **base, **start}
-            for base in ({}, *friction_grid(group))
-            for start in candidate.starts(self._peaks(residual))
-        ]
+        own = candidate.starts(self._peaks(residual))
+        bases = ({}, *friction_grid(group)) if len(own) <= MOST_STARTS else ({},)
         problem = self.problem(group, there)
-        count = 1 if 'p2-x' in group.stages else 2
-        return self._best_of(there, starts, problem, count, SCREENING)[0]
+        best = []
+        for start in own:
+            starts = [{**candidate.neutral, **valve.values, **base, **start} for base in bases]
+            best.append(self._scan(there, starts, problem, SCREENING)[0])
+        best = sorted(best, key=_cost)[:SCREENED]
+        return min((self.fit(each, problem, SHORT, SCREENING) for each in best), key=_cost)
 
     def _peaks(self, residual: Array) -> tuple[float, ...]:
-        """Return the frequencies at which a residual swings most [Hz]."""
+        """Return the frequencies at which a residual swings most, and their neighbours [Hz]."""
         if not residual.size:
             return ()
         period = float(np.median(np.diff(self.bench.stretches[0].time)))
-        frequency, power = periodogram(residual, 1.0 / period)
+        frequency, power = periodogram(np.clip(residual, -10.0, 10.0), 1.0 / period)
         inside = (frequency > 0.02) & (frequency < 0.45 / period)
-        return tuple(frequency[inside][np.argsort(-power[inside])[:3]])
+        tops = frequency[inside][np.argsort(-power[inside])[:3]]
+        return tuple(f + part * frequency[1] for f in tops for part in (-0.4, 0.0, 0.4))
 
     def _settle_phase(self, group: Group, valve: Valve) -> None:
         """Find out whether p1 answers at the sample that shows the command or at the next."""
@@ -266,17 +277,28 @@ class Fitter:
         coarse: float = COARSE,
     ) -> list[Valve]:
         """Try starts, descend a little from the best of them, and order what comes out."""
+        tried = self._scan(valve, starts, problem, coarse, count)
+        fits = [self.fit(there, problem, SHORT, coarse) for there in tried]
+        return sorted(fits, key=_cost)
+
+    def _scan(
+        self,
+        valve: Valve,
+        starts: Sequence[Mapping[str, float]],
+        problem: 'Problem',
+        coarse: float,
+        count: int = 1,
+    ) -> list[Valve]:
+        """Return the best starts, best first."""
         _, signal, drive = problem
         tried: list[Valve] = []
         bound = math.inf
         for start in starts:
             there = replace(valve, values=start)
             cost = self.score(there, signal, drive, coarse, bound)
-            tried.append(replace(there, cost=cost))
-            tried.sort(key=_cost)
-            bound = tried[count].cost if len(tried) > count else math.inf
-        fits = [self.fit(there, problem, SHORT, coarse) for there in tried[:count]]
-        return sorted(fits, key=_cost)
+            tried = sorted([*tried, replace(there, cost=cost)], key=_cost)[:count]
+            bound = tried[-1].cost if len(tried) == count else math.inf
+        return tried
 
 
 Problem = tuple[tuple[Unknown, ...], str, tuple[str, ...]]

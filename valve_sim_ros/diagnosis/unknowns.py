@@ -68,6 +68,10 @@ def start_of(name: str) -> Unknown:
 def of_effect(effect: str, name: str) -> Unknown:
     """Return the coordinate of an effect's parameter."""
     parameter = declared(effect, name)
+    if parameter.step:
+        return Unknown(
+            f'{effect}.{name}', parameter.lower, parameter.upper, 'linear', parameter.step
+        )
     if parameter.scale == 'log':
         return Unknown(f'{effect}.{name}', parameter.lower, parameter.upper, 'log', 0.05)
     step = 0.08 * max(abs(parameter.default - parameter.neutral), 0.03 * parameter.upper)

@@ -108,12 +108,18 @@ class EffectParameter(Parameter):
     """A parameter of an effect; the effect is absent while all have their neutral value.
 
     `stage` says where this parameter acts if that differs from the effect's own stage; `starts`
-    are the values from which a search has to start where one start is not enough.
+    are the values from which a search has to start where one start is not enough, and `step` its
+    first step where costs are so narrow that the usual one would jump over them. `usual` is how
+    far from neutral it usually lies, `positive` whether it never lies below: they decide where
+    data cannot.
     """
 
     neutral: float = 0.0
     stage: str = ''
     starts: tuple[float, ...] = ()
+    step: float = 0.0
+    usual: tuple[float, ...] = ()
+    positive: bool = False
 
     def __post_init__(self) -> None:
         """Refuse a neutral value that is not legal."""

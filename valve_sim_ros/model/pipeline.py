@@ -365,11 +365,13 @@ def run_scored(
     parameters = theta_from(theta)
     effects, memory = borrowed(effects), borrowed(memory)
     now = state_from(state)
-    transition = transition_over(0.0, parameters, finest)
+    transition = other = transition_over(0.0, parameters, finest)
     score = 0.0
     for k in range(u.size):
-        if dt[k] != transition.dt:
-            transition = transition_over(dt[k], parameters, finest)
+        if dt[k] != transition.dt:  # steps often alternate between two lengths
+            transition, other = other, transition
+            if dt[k] != transition.dt:
+                transition = transition_over(dt[k], parameters, finest)
         now, x = advance_sample(u[k], now, parameters, transition, effects, memory)
         outputs[0, k] = now.p1
         outputs[1, k] = now.p2

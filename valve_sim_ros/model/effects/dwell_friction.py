@@ -49,6 +49,7 @@ EFFECT = Effect(
             'linear',
             'Relative growth of f_s after long rest',
             starts=(0.3, 1.0),
+            usual=(0.08, 1.8),
         ),
         EffectParameter(
             'time_constant',

@@ -39,6 +39,7 @@ EFFECT = Effect(
             'linear',
             'Closing force at the seat',
             starts=(-12.0, -5.0, 5.0, 12.0),
+            usual=(3.0, 20.0),
         ),
         EffectParameter(
             'reach',

@@ -39,6 +39,7 @@ EFFECT = Effect(
             'linear',
             'Opening friction is 1 + d, closing friction 1 - d times the mean',
             starts=(-0.5, -0.2, 0.2, 0.5),
+            usual=(0.08, 0.72),
         ),
     ),
     slots={'force_slot': force},

@@ -42,6 +42,7 @@ EFFECT = Effect(
             30.0,
             'linear',
             'Half-width of the widest play that p1 passes through',
+            usual=(1.0, 15.0),
         ),
         EffectParameter(
             'stem_width',
@@ -54,6 +55,7 @@ EFFECT = Effect(
             'Half-width of the widest play that x passes through',
             stage='p2-x',
             starts=(2.0, 6.0),
+            usual=(1.0, 15.0),
         ),
     ),
     slots={'inlet_slot': inlet, 'sensor_slot': sensor},

@@ -10,9 +10,16 @@ from ..declarations import Effect, EffectParameter
 
 
 @njit
+def command(value: float, state: Any, p: Any, memory: Any, dt: float) -> float:
+    """Apply the share of zero and span that lies before the backlash."""
+    return p[0] * p[2] + (1.0 + (p[1] - 1.0) * p[2]) * value
+
+
+@njit
 def inlet(value: float, state: Any, p: Any, memory: Any, dt: float) -> float:
-    """Return p1 = zero + span p1."""
-    return p[0] + p[1] * value
+    """Apply the share of zero and span that lies after the backlash."""
+    after = 1.0 - p[2]
+    return p[0] * after + (1.0 + (p[1] - 1.0) * after) * value
 
 
 EFFECT = Effect(
@@ -20,12 +27,45 @@ EFFECT = Effect(
     title='Zero or span error of the electro-pneumatic converter',
     stage='u-p1',
     parameters=(
-        EffectParameter('zero', 'p_0', '%', 3.0, -30.0, 30.0, 'linear', 'p1 where it should be 0'),
         EffectParameter(
-            'span', 's', '-', 1.0, 0.5, 1.5, 'linear', 'Change of p1 per change of u', neutral=1.0
+            'zero',
+            'p_0',
+            '%',
+            3.0,
+            -30.0,
+            30.0,
+            'linear',
+            'p1 where it should be 0',
+            starts=(-2.0, 0.0, 2.0),
+            usual=(0.4, 5.5),
+        ),
+        EffectParameter(
+            'span',
+            's',
+            '-',
+            1.0,
+            0.5,
+            1.5,
+            'linear',
+            'Change of p1 per change of u',
+            neutral=1.0,
+            starts=(0.93, 1.0, 1.07),
+            usual=(0.008, 0.13),
+        ),
+        EffectParameter(
+            'upstream',
+            'w',
+            '-',
+            0.0,
+            0.0,
+            1.0,
+            'linear',
+            'Share of it before the backlash',
+            starts=(0.5,),
         ),
     ),
-    slots={'inlet_slot': inlet},
+    variants=(('zero', 'span', 'upstream'),),
+    slots={'command_slot': command, 'inlet_slot': inlet},
     order=0,
     explanation='The converter is out of adjustment: its line from u to p1 is shifted or tilted.',
     symptom='The static line between u and p1 is off by a constant, by a slope, or both.',

@@ -10,9 +10,21 @@ from ..declarations import Effect, EffectParameter
 
 
 @njit
+def bowed(value: float, bow: float) -> float:
+    """Return a value with a parabola added that is zero at both ends of the span."""
+    return value + bow * value * (100.0 - value) / 2500.0
+
+
+@njit
+def command(value: float, state: Any, p: Any, memory: Any, dt: float) -> float:
+    """Bend the command by the share before the backlash."""
+    return bowed(value, p[0] * p[1])
+
+
+@njit
 def inlet(value: float, state: Any, p: Any, memory: Any, dt: float) -> float:
-    """Return p1 with a parabola added that is zero at both ends of the span."""
-    return value + p[0] * value * (100.0 - value) / 2500.0
+    """Bend p1 by the share after the backlash."""
+    return bowed(value, p[0] * (1.0 - p[1]))
 
 
 EFFECT = Effect(
@@ -21,10 +33,30 @@ EFFECT = Effect(
     stage='u-p1',
     parameters=(
         EffectParameter(
-            'bow', 'c', '%', 5.0, -24.0, 24.0, 'linear', 'Deviation of p1 at mid span'
+            'bow',
+            'c',
+            '%',
+            5.0,
+            -24.0,
+            24.0,
+            'linear',
+            'Deviation of p1 at mid span',
+            starts=(-8.0, -2.0, 2.0, 8.0),
+        ),
+        EffectParameter(
+            'upstream',
+            'w',
+            '-',
+            0.0,
+            0.0,
+            1.0,
+            'linear',
+            'Share of it before the backlash',
+            starts=(0.5,),
         ),
     ),
-    slots={'inlet_slot': inlet},
+    variants=(('bow', 'upstream'),),
+    slots={'command_slot': command, 'inlet_slot': inlet},
     order=10,
     explanation='The converter meets its ends but not the straight line between them.',
     symptom='The static line between u and p1 bends, most at mid span.',

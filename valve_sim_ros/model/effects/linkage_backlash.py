@@ -34,6 +34,7 @@ EFFECT = Effect(
             'linear',
             'Play between stem and sensor',
             starts=(0.6, 1.5, 3.5),
+            usual=(0.2, 7.0),
         ),
     ),
     slots={'sensor_slot': sensor},

@@ -12,12 +12,13 @@ from ..declarations import Effect, EffectParameter
 @njit
 def command(value: float, state: Any, p: Any, memory: Any, dt: float) -> float:
     """Return the output of a PI controller of the stem position, u + K (u - x) + I."""
-    gain, integral_gain = p
+    gain, integral_gain, overdrive = p
     error = value - state.x
     raised = value + gain * error + memory[0]
-    if 0.0 < raised < 100.0 or raised * error < 0.0 or (raised >= 100.0 and error < 0.0):
+    low, high = -overdrive, 100.0 + overdrive
+    if low < raised < high or (raised <= low) == (error > 0.0):  # no wind-up
         memory[0] += integral_gain * dt * error
-    return min(max(raised, 0.0), 100.0)
+    return min(max(raised, low), high)
 
 
 EFFECT = Effect(
@@ -25,16 +26,47 @@ EFFECT = Effect(
     title='Positioner in the loop',
     stage='u-p1',
     parameters=(
-        EffectParameter('gain', 'K', '-', 1.0, 0.0, 20.0, 'linear', 'Proportional gain on u - x'),
         EffectParameter(
-            'integral_gain', 'K_i', '1/s', 0.0, 0.0, 5.0, 'linear', 'Integral gain on u - x'
+            'gain',
+            'K',
+            '-',
+            1.0,
+            0.0,
+            20.0,
+            'linear',
+            'Proportional gain on u - x',
+            starts=(0.4, 1.5),
+            usual=(0.2, 4.0),
+        ),
+        EffectParameter(
+            'integral_gain',
+            'K_i',
+            '1/s',
+            0.0,
+            0.0,
+            5.0,
+            'linear',
+            'Integral gain on u - x',
+            starts=(0.0, 0.03),
+        ),
+        EffectParameter(
+            'overdrive',
+            'o',
+            '%',
+            100.0,
+            0.0,
+            100.0,
+            'linear',
+            'How far beyond the span of u it can drive the converter',
+            neutral=100.0,
+            starts=(0.0,),
         ),
     ),
     slots={'command_slot': command},
     memory=1,
     longest_step=0.04,
     order=0,
-    variants=(('gain',), ('gain', 'integral_gain')),
+    variants=(('gain',), ('gain', 'integral_gain'), ('gain', 'integral_gain', 'overdrive')),
     explanation='A positioner compares the stem with the command and drives the converter harder.',
     symptom='p1 moves while u rests, and overshoots after each step until the stem has followed.',
     confirm='Hold u after a step and watch p1; or bypass the positioner.',

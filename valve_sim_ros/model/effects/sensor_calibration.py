@@ -30,6 +30,7 @@ EFFECT = Effect(
             'linear',
             'Measured x where it should be 0',
             starts=(-3.0, 0.0, 3.0),
+            usual=(0.4, 5.5),
         ),
         EffectParameter(
             'span',
@@ -42,6 +43,7 @@ EFFECT = Effect(
             'Change of measured per true x',
             neutral=1.0,
             starts=(0.9, 1.0, 1.1),
+            usual=(0.008, 0.16),
         ),
     ),
     slots={'sensor_slot': sensor},

@@ -40,6 +40,7 @@ EFFECT = Effect(
             'linear',
             'Relative extra spring force when fully open, growing with the cube of x',
             starts=(-0.2, 0.1, 0.4, 1.0),
+            usual=(0.03, 1.2),
         ),
         EffectParameter(
             'bow',
@@ -51,6 +52,7 @@ EFFECT = Effect(
             'linear',
             'Extra spring force at mid stroke',
             starts=(-10.0, -3.0, 3.0, 10.0),
+            usual=(1.0, 20.0),
         ),
     ),
     slots={'force_slot': force},

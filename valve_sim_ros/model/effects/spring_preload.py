@@ -34,7 +34,16 @@ EFFECT = Effect(
     stage='p2-x',
     parameters=(
         EffectParameter(
-            'pressure', 'p_0', '%', 5.0, -40.0, 40.0, 'linear', 'Pressure that the preload takes'
+            'pressure',
+            'p_0',
+            '%',
+            5.0,
+            -40.0,
+            40.0,
+            'linear',
+            'Pressure that the preload takes',
+            usual=(1.5, 16.0),
+            positive=True,
         ),
     ),
     slots={'force_slot': force, 'motion_slot': motion},

@@ -35,6 +35,7 @@ EFFECT = Effect(
             'Spring force per travel, relative to nominal',
             neutral=1.0,
             starts=(0.65, 0.8, 0.9, 1.12, 1.25, 1.5),
+            usual=(0.045, 0.45),
         ),
     ),
     slots={'force_slot': force},

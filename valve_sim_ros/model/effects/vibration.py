@@ -45,6 +45,7 @@ EFFECT = Effect(
             10.0,
             'log',
             'Frequency of the periodic force',
+            step=1e-4,
             neutral=0.2,
         ),
         EffectParameter(

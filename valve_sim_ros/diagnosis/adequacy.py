@@ -1,0 +1,63 @@
+# Copyright 2026 The valve_sim_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Is what a model leaves over more than noise? The null model of the diagnosis."""
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy.stats import chi2
+
+from ..model.pipeline import Array
+
+WINDOW = 20
+"""Samples of the windows in which noise is told from misfit."""
+QUIET = 0.3
+"""The quietest share of the windows shows the noise."""
+LAGS = 12
+"""Lags over which noise may be coloured [samples]."""
+
+
+class Leftover(NamedTuple):
+    """What a model leaves of a signal, in multiples of the noise seen from sample to sample.
+
+    mean_square of the whole, that of the noise alone, the number of samples that count, and how
+    many of them make one independent value (coloured noise).
+    """
+
+    mean_square: float
+    floor: float
+    count: int
+    inflation: float
+
+    @property
+    def excess(self) -> float:
+        """Mean square beyond the noise, over the noise."""
+        return max(self.mean_square / self.floor - 1.0, 0.0)
+
+
+def leftover(residual: Array) -> Leftover:
+    """Look at the residual of a signal over its noise, shape (n,), 0 or NaN where not counted."""
+    values = residual[np.isfinite(residual) & (residual != 0.0)]
+    if values.size < 4 * WINDOW:
+        return Leftover(float(np.mean(values**2)) if values.size else 0.0, 1.0, values.size, 1.0)
+    windows = values[: values.size // WINDOW * WINDOW].reshape(-1, WINDOW)
+    centred = windows - windows.mean(axis=1, keepdims=True)
+    variances = centred.var(axis=1, ddof=1)
+    expected = chi2.ppf(QUIET, WINDOW - 1) / (WINDOW - 1)
+    floor = float(np.quantile(variances, QUIET)) / expected
+    quiet = windows[variances <= np.quantile(variances, 0.6)]
+    inflation = _inflation(quiet)
+    clipped = np.clip(values, -10.0, 10.0)
+    return Leftover(
+        float(np.mean(clipped**2)), max(floor * inflation**0.5, 0.3), values.size, inflation
+    )
+
+
+def _inflation(windows: Array) -> float:
+    """Return 1 + 2 sum of the autocorrelations inside windows, corrected for their own mean."""
+    centred = windows - windows.mean(axis=1, keepdims=True)
+    n = windows.shape[1]
+    power = float(np.mean(centred**2))
+    first = float(np.mean(centred[:, 1:] * centred[:, :-1])) / power + 1.0 / n
+    colour = min(max(first, 0.0), 0.9)
+    return (1.0 + colour) / (1.0 - colour)

@@ -1,0 +1,232 @@
+# Copyright 2026 The valve_sim_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""From recordings to a verdict: find, name, add, show."""
+
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import replace
+import os
+
+from ..model.spec import ValveSpec
+from ..recordings import read_recording
+from ..recordings.recording import Recording
+from .bench import Bench
+from .conditions import Place, places
+from .errors import DiagnosisError
+from .fitting import Fitter, starting_valve, Valve
+from .intervals import intervals
+from .ladder import climb, Ladder
+from .proof import prove
+from .result import Diagnosis, Named
+from .stages import Group, groups
+from .unknowns import complete
+
+Data = Recording | str | os.PathLike[str]
+Progress = Callable[[float, str], object]
+
+
+def diagnose(
+    data: Data | Sequence[Data],
+    *,
+    topics: Mapping[str, str] | None = None,
+    seed: int = 0,
+    spec: ValveSpec | None = None,
+    progress: Progress | None = None,
+    without: Collection[str] = (),
+) -> Diagnosis:
+    """Find where the base valve and a recording disagree, and name the effect that is missing.
+
+    Parameters
+    ----------
+    data : Recording, path-like, or a sequence of them
+        Bags, CSV files or recordings of one valve, with u and any of p1, p2, x.
+    topics : mapping of str to str, optional
+        Topic or column of signals.
+    seed : int
+        Of the searches.
+    spec : ValveSpec, optional
+        What is known of the valve: where the search starts; its effects stay in force.
+    progress : callable, optional
+        Called with the share done and what is being done.
+    without : collection of str
+        Effects to leave out of the catalogue.
+
+    Returns
+    -------
+    Diagnosis
+        With verdict, effects, places, gaps, and both valves.
+
+    Raises
+    ------
+    DiagnosisError
+        If nothing can be learnt from the data.
+    RecordingError
+        If the data cannot be read.
+    """
+    tell = progress or (lambda share, text: None)
+    tell(0.0, 'reading')
+    recordings = _read(data, topics)
+    bench = Bench(recordings)
+    _refuse_useless(bench)
+    fitter = Fitter(bench, seed=seed)
+    parts = groups(bench.signals)
+    valve = _known(starting_valve(bench), spec)
+    for group in parts:
+        tell(0.05, f'fitting the base valve to {group.signal}')
+        valve = fitter.base(group, valve, group.drive)
+    ladders, base = _climb_all(fitter, parts, valve, without, tell)
+    tell(0.88, 'refitting the base valve')
+    base = _plain(fitter, parts, ladders, base)
+    augmented = ladders[-1].valve
+    tell(0.92, 'holding out')
+    floors = {ladder.group.signal: ladder.after.floor for ladder in ladders}
+    gaps, _, _ = prove(fitter, parts, base, augmented, floors)
+    tell(0.97, 'writing down')
+    return Diagnosis(
+        recordings=tuple(recordings),
+        bench=bench,
+        ladders=tuple(ladders),
+        effects=_named(fitter, ladders),
+        places=_places(fitter, ladders),
+        gaps=gaps,
+        base=_spec(base),
+        augmented=_spec(augmented),
+        base_valve=base,
+        augmented_valve=augmented,
+        seed=seed,
+    )
+
+
+def _read(data: Data | Sequence[Data], topics: Mapping[str, str] | None) -> list[Recording]:
+    """Return all recordings."""
+    each = [data] if isinstance(data, Recording | str | os.PathLike) else list(data)
+    if not each:
+        raise DiagnosisError('no data given: expected at least one bag or CSV file')
+    return [
+        item if isinstance(item, Recording) else read_recording(item, topics=topics)
+        for item in each
+    ]
+
+
+def _refuse_useless(bench: Bench) -> None:
+    """Refuse data that cannot tell anything."""
+    if not bench.signals:
+        raise DiagnosisError(
+            'no output is measured in all recordings: expected p1, p2 or x beside u'
+        )
+    if bench.size < LEAST_SAMPLES:
+        raise DiagnosisError(
+            f'{bench.size} samples in stretches without gaps: expected at least {LEAST_SAMPLES}; '
+            'record the valve for some minutes while the command moves'
+        )
+    low, high = bench.range_of_u
+    if high - low < 1.0:
+        raise DiagnosisError(
+            f'u stays between {low:.4g} and {high:.4g} %: nothing moves, nothing can be told; '
+            'record the valve while the command steps up and down'
+        )
+
+
+LEAST_SAMPLES = 200
+
+
+def _known(valve: Valve, spec: ValveSpec | None) -> Valve:
+    """Return the valve to start from with what is known of it."""
+    if spec is None:
+        return valve
+    if spec.model != 'base':
+        raise DiagnosisError(
+            f'parameters of model {spec.model}: the diagnosis looks for what model base lacks'
+        )
+    values = dict(spec.values)
+    values['f_d/f_s'] = values['f_d'] / max(values['f_s'], 1e-9)
+    values['a_1/a_2'] = values['a_1'] / values['a_2']
+    return replace(valve, values={**valve.values, **values}, effects=spec.effects)
+
+
+def _climb_all(
+    fitter: Fitter,
+    parts: Sequence[Group],
+    valve: Valve,
+    without: Collection[str],
+    tell: Progress,
+) -> tuple[list[Ladder], Valve]:
+    """Climb the ladder of each group in the order of the flow."""
+    ladders: list[Ladder] = []
+    base = valve
+    for index, group in enumerate(parts):
+        share, width = 0.1 + 0.78 * index / len(parts), 0.78 / len(parts)
+        text = f'looking at {group.signal}'
+        tell(share, text)
+        valve = fitter.base(group, valve, fitter.drive)
+        known = {*without, *valve.effects}
+        unknown = any(ladder.outcome == 'unknown_effect' for ladder in ladders)
+        ladder = climb(
+            fitter,
+            group,
+            valve,
+            () if unknown else group.candidates(known),
+            lambda done, share=share, width=width, text=text: tell(  # type: ignore[misc]
+                share + width * done, text
+            ),
+        )
+        ladders.append(ladder)
+        valve = ladder.valve
+        if ladder.outcome == 'unknown_effect':
+            fitter.drive = (*fitter.drive, group.signal)
+    fitter.drive = ()
+    return ladders, base
+
+
+def _plain(
+    fitter: Fitter, parts: Sequence[Group], ladders: Sequence[Ladder], base: Valve
+) -> Valve:
+    """Return the base valve fitted to all signals without any effect that was added."""
+    added = False
+    for group, ladder in zip(parts, ladders, strict=True):
+        if added:
+            base = fitter.base(group, base, ())
+        else:
+            names = [unknown.name for unknown in fitter.unknowns(group)]
+            found = {name: ladder.base.values[name] for name in names}
+            base = replace(base, values={**base.values, **found})
+        added = added or bool(ladder.rungs)
+    return base
+
+
+def _named(fitter: Fitter, ladders: Sequence[Ladder]) -> tuple[Named, ...]:
+    """Return the effects that were added, with parameters and intervals."""
+    named = []
+    for ladder in ladders:
+        if ladder.outcome != 'missing_effect':
+            continue
+        spans = intervals(fitter, ladder.group, ladder.valve, ladder.after.inflation)
+        for rung in ladder.rungs:
+            own = {n: s for n, s in spans.items() if n.startswith(f'{rung.effect}.')}
+            named.append(Named(rung, {n: ladder.valve.values[n] for n in own}, own))
+    return tuple(named)
+
+
+def _places(fitter: Fitter, ladders: Sequence[Ladder]) -> tuple[Place, ...]:
+    """Return where each group that disagrees does so."""
+    found: list[Place] = []
+    for ladder in ladders:
+        if ladder.outcome == 'adequate':
+            continue
+        residual = fitter.residuals(ladder.base, ladder.group.signal)
+        results = fitter.bench.run(complete(ladder.base.values), ladder.base.effects)
+        stage = ladder.rungs[0].stage if ladder.rungs else ladder.group.stages[-1]
+        found += places(fitter.bench, stage, ladder.group.signal, residual, results)
+    return tuple(found)
+
+
+def _spec(valve: Valve) -> ValveSpec:
+    """Return a fitted valve as the plant loads it."""
+    values = complete(valve.values)
+    spec = ValveSpec(effects=valve.effects)
+    kept = {}
+    for parameter in spec.parameters:
+        if parameter.name in values:
+            kept[parameter.name] = min(
+                max(values[parameter.name], parameter.lower), parameter.upper
+            )
+    return spec.changed(kept)

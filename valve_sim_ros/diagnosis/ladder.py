@@ -1,0 +1,171 @@
+# Copyright 2026 The valve_sim_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The ladder: in one group of stages, one effect after the other until noise is left."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Literal
+
+from . import odds
+from .adequacy import Leftover, leftover
+from .fitting import Fitter, Valve
+from .stages import Candidate, Group
+
+MOST_EFFECTS = 2
+"""Most effects named in one group of stages."""
+
+Outcome = Literal['adequate', 'missing_effect', 'unknown_effect']
+
+
+@dataclass(frozen=True)
+class Rung:
+    """One step of the ladder.
+
+    Attributes
+    ----------
+    effect, stage : str
+        What was added, and where it acts.
+    gains : mapping of str to float
+        Evidence for each effect that was tried: half log-likelihood of independent samples.
+    before, after : Leftover
+        What the valve left of the group's signal before and after.
+    closed : float
+        Part of the excess over the noise that it removed.
+    probability : float
+        Calibrated.
+    twins : tuple of str
+        Effects that these data do not tell from it.
+    valve : Valve
+        With it.
+    """
+
+    effect: str
+    stage: str
+    gains: dict[str, float]
+    before: Leftover
+    after: Leftover
+    closed: float
+    probability: float
+    twins: tuple[str, ...]
+    valve: Valve
+
+    @property
+    def runner_up(self) -> str | None:
+        """The effect that comes next."""
+        others = {n: g for n, g in self.gains.items() if n != self.effect and g > 0.0}
+        return max(others, key=lambda name: others[name]) if others else None
+
+
+@dataclass(frozen=True)
+class Ladder:
+    """What was found in one group of stages."""
+
+    group: Group
+    outcome: Outcome
+    base: Valve
+    valve: Valve
+    before: Leftover
+    after: Leftover
+    rungs: tuple[Rung, ...] = ()
+    best_guess: Rung | None = None
+
+
+def climb(
+    fitter: Fitter,
+    group: Group,
+    valve: Valve,
+    candidates: Sequence[Candidate],
+    progress: Callable[[float], object] = lambda share: None,
+) -> Ladder:
+    """Add effects to a valve as long as the evidence asks for more.
+
+    Parameters
+    ----------
+    fitter : Fitter
+        At the bench.
+    group : Group
+        The stages in question.
+    valve : Valve
+        Fitted, with the effects of the stages before.
+    candidates : sequence of Candidate
+        What may be missing.
+    progress : callable
+        Called with the share done.
+    """
+    before = base_left = leftover(fitter.residuals(valve, group.signal))
+    base = now = valve
+    rungs: list[Rung] = []
+    guess = None
+    for step in range(MOST_EFFECTS):
+        if not candidates or (rungs and before.excess <= odds.CLEAN):
+            break
+        runners = fitter.race(
+            group,
+            now,
+            candidates,
+            lambda share, step=step: progress((step + share) / MOST_EFFECTS),  # type: ignore[misc]
+        )
+        now = fitter.rebased(group, now, runners[:5])
+        if not rungs:
+            base = now
+            base_left = leftover(fitter.residuals(now, group.signal))
+        before = leftover(fitter.residuals(now, group.signal))
+        rung = judged(fitter, group, now, before, runners)
+        if rung is None:
+            break
+        if rung.closed < odds.EXPLAINED and rung.after.excess > odds.CLEAN:
+            guess = rung
+            if rung.after.excess <= odds.ADEQUATE:
+                break  # no more than the null model leaves, and this does not explain it
+        rungs.append(rung)
+        now, before = rung.valve, rung.after
+        candidates = [c for c in candidates if c.effect != rung.effect]
+    after = leftover(fitter.residuals(now, group.signal))
+    progress(1.0)
+    return concluded(Ladder(group, 'adequate', base, now, base_left, after, tuple(rungs), guess))
+
+
+def judged(
+    fitter: Fitter, group: Group, now: Valve, before: Leftover, runners: Sequence[Valve]
+) -> Rung | None:
+    """Return the step to the best runner if the evidence is enough."""
+    best_after = leftover(fitter.residuals(runners[0], group.signal))
+    inflation, count = best_after.inflation, best_after.count
+    tops = odds.best_per_effect(runners)
+    gains = {
+        each.candidates[-1].effect: odds.gain(now.cost, each, inflation, count) for each in tops
+    }
+    best = odds.choice(tops, gains)
+    candidate = best.candidates[-1]
+    after = leftover(fitter.residuals(best, group.signal))
+    change = before.mean_square - after.mean_square
+    least = odds.LEAST_SHIFT if candidate.effect in odds.LASTING else odds.LEAST_CHANGE
+    if gains[candidate.effect] < odds.ENOUGH or change < least:
+        return None
+    floor = min(before.floor, after.floor)
+    missing = max(before.mean_square - floor, 1e-9)
+    closed = min(max(1.0 - (after.mean_square - floor) / missing, 0.0), 1.0)
+    return Rung(
+        candidate.effect,
+        candidate.stage,
+        gains,
+        before,
+        after,
+        closed,
+        odds.probability(gains, candidate.effect, closed),
+        tuple(odds.close_rivals(gains, candidate.effect)),
+        best,
+    )
+
+
+def concluded(ladder: Ladder) -> Ladder:
+    """Return the ladder with its outcome: names only if together they explain the gap."""
+    floor = min(ladder.before.floor, ladder.after.floor)
+    missing = ladder.before.mean_square - floor
+    closed = 1.0 - (ladder.after.mean_square - floor) / missing if missing > 0.0 else 1.0
+    explained = closed >= odds.EXPLAINED or ladder.after.excess <= odds.CLEAN
+    if ladder.rungs and explained:
+        return replace(ladder, outcome='missing_effect')
+    if ladder.before.excess > odds.ADEQUATE:
+        return replace(ladder, outcome='unknown_effect')
+    return replace(ladder, valve=ladder.base, after=ladder.before, rungs=())

@@ -1,0 +1,91 @@
+# Copyright 2026 The valve_sim_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""How strong evidence must be: numbers set once on the tuning half of the blind records."""
+
+from collections.abc import Mapping, Sequence
+import math
+
+from .fitting import Valve
+from .unknowns import declared
+
+ENOUGH = 25.0
+"""Least gain in half log-likelihoods of independent samples for any name."""
+LASTING = (
+    'ip_calibration',
+    'ip_nonlinearity',
+    'friction_asymmetry',
+    'spring_preload',
+    'spring_rate',
+    'spring_nonlinearity',
+    'fluid_force',
+    'sensor_calibration',
+    'sensor_drift',
+)
+"""Effects that shift a signal for long: small ones are nothing but the bias of a fit."""
+LEAST_SHIFT, LEAST_CHANGE = 0.2, 0.015
+"""Least mean square that such an effect, and any other, must remove [noise]."""
+ADEQUATE = 0.8
+"""Excess over the noise that still counts as adequate (other solvers, jitter)."""
+CLEAN = 0.25
+"""Excess that counts as noise once an effect is added."""
+EXPLAINED = 0.6
+"""Least part of the excess that a name must close, else the effect is unknown."""
+TWIN_GAIN, TWIN_SHARE = 12.0, 0.003
+"""Rivals whose gain is less than this, or this share of the gain, behind cannot be excluded."""
+
+
+def gain(before: float, after: Valve, inflation: float, count: int) -> float:
+    """Return what one more effect brings: likelihood of independent samples less BIC."""
+    independent = max(count / inflation, 10.0)
+    penalty = 0.5 * len(after.candidates[-1].names) * math.log(independent)
+    return 0.5 * (before - after.cost) / inflation - penalty
+
+
+def choice(runners: Sequence[Valve], gains: Mapping[str, float]) -> Valve:
+    """Return the best runner; of those the data do not tell apart, the most plausible."""
+    best = max(gains.values())
+    limit = max(TWIN_GAIN, TWIN_SHARE * best)
+    close = [each for each in runners if best - gains[each.candidates[-1].effect] < limit]
+    return min(close, key=lambda each: (surprise(each), -gains[each.candidates[-1].effect]))
+
+
+def surprise(valve: Valve) -> int:
+    """Return how odd a fitted effect would be: parameters, and sizes out of the usual."""
+    candidate = valve.candidates[-1]
+    odd = 0
+    for name in candidate.names:
+        parameter = declared(candidate.effect, name)
+        size = abs(valve.values[f'{candidate.effect}.{name}'] - parameter.neutral)
+        odd += bool(parameter.usual) and not parameter.usual[0] <= size <= parameter.usual[1]
+        if parameter.positive and valve.values[f'{candidate.effect}.{name}'] < parameter.neutral:
+            odd += 1
+    return odd
+
+
+def close_rivals(gains: Mapping[str, float], best: str) -> list[str]:
+    """Return the effects that the data do not tell from the best, closest first."""
+    limit = max(TWIN_GAIN, TWIN_SHARE * gains[best])
+    near = [name for name in gains if name != best and gains[best] - gains[name] < limit]
+    return sorted(near, key=lambda name: -gains[name])
+
+
+def probability(gains: Mapping[str, float], best: str, closed: float) -> float:
+    """Return the calibrated probability that `best` is the effect.
+
+    Fitted by logistic regression to the verdicts on the tuning records.
+    """
+    others = [value for name, value in gains.items() if name != best]
+    lead = gains[best] - max([0.0, *others])
+    score = OFFSET + LEAD * math.log1p(max(lead, 0.0)) + CLOSED * max(closed, 0.0)
+    return 1.0 / (1.0 + math.exp(-score))
+
+
+OFFSET, LEAD, CLOSED = -3.0, 0.45, 3.5
+
+
+def best_per_effect(runners: Sequence[Valve]) -> list[Valve]:
+    """Return the best runner of each effect, in the order of the runners."""
+    seen: dict[str, Valve] = {}
+    for runner in runners:
+        seen.setdefault(runner.candidates[-1].effect, runner)
+    return list(seen.values())
