@@ -5,6 +5,7 @@
 import click
 
 from .. import __version__
+from .diagnose import diagnose_command
 from .doctor import doctor_command
 from .identify import identify_command
 from .simulate import simulate_command
@@ -27,6 +28,7 @@ def main() -> None:
     """Simulate a pneumatic control valve, or fit one to a recording."""
 
 
+main.add_command(diagnose_command)
 main.add_command(doctor_command)
 main.add_command(identify_command)
 main.add_command(simulate_command)

@@ -21,6 +21,8 @@ OUTLIER = 6.0
 KEPT_GRIDS = 60
 JITTER = 0.1
 """Uncertainty of when a sample was taken, as a share of the period."""
+MIXED, MIXED_JITTER = 0.06, 0.7
+"""Share of late commands from which arrivals are mixed, and the uncertainty that follows."""
 TRAVEL, MOST_UNSETTLED = 8.0, 0.1
 """A record counts once the valve has travelled this far [%], or after this share."""
 REST = 5
@@ -131,6 +133,7 @@ class Bench:
 
     def __init__(self, recordings: Sequence[Recording]) -> None:
         """Cut the recordings into stretches and look at the noise."""
+        self.jitter = JITTER
         self.signals = tuple(
             name for name in OUTPUTS if all(name in recording.signals for recording in recordings)
         )
@@ -259,7 +262,34 @@ class Bench:
         slope = np.nan_to_num(np.fmax(steps[:-1], steps[1:]))
         noise = self.noise[name]
         slope = np.maximum(slope - 2.0 * noise, 0.0)
-        return np.sqrt(noise**2 + (JITTER * slope) ** 2)
+        return np.sqrt(noise**2 + (self.jitter * slope) ** 2)
+
+    def mixed_arrivals(self, results: Sequence[Array]) -> bool:
+        """Tell whether some samples of p1 show a command and others not yet, as if by chance.
+
+        That is so where samples are taken just when commands arrive, and jitter. Samples of a
+        changing command then tell little: they are weighed down.
+
+        Parameters
+        ----------
+        results : sequence of ndarray
+            p1, p2, x of the base valve by stretch, shape (3, n), commands acting at once.
+        """
+        late = on_time = 0
+        for stretch, result in zip(self.stretches, results, strict=True):
+            now, before = result[0, 1:], result[0, :-1]
+            seen, noise = stretch.counts['p1'][1:], self.noise['p1']
+            told = np.abs(now - before) > 8.0 * noise
+            late += int(np.sum(told & (np.abs(seen - before) < 3.0 * noise)))
+            on_time += int(np.sum(told & (np.abs(seen - now) < 3.0 * noise)))
+        return min(late, on_time) > MIXED * (late + on_time)
+
+    def weigh_down(self, jitter: float) -> None:
+        """Let sample times be uncertain by this share of a period."""
+        self.jitter = jitter
+        for stretch in self.stretches:
+            stretch.noise = {n: self._uncertainty(n, v) for n, v in stretch.measured.items()}
+            stretch.recount(stretch.counts)
 
     def _settled(self, stretch: Stretch) -> int:
         """Return the first sample by which the unknown state before the record is forgotten.

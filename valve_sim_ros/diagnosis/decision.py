@@ -23,8 +23,8 @@ HOLD, SPEED = 40.0, 1.0
 """Hold after a step [s], and speed of the ramps [%/s]."""
 
 
-def decide_by(rung: Rung, signals: Sequence[str]) -> str:
-    """Return the test or the topic that would decide, in words."""
+def decisions(rung: Rung, signals: Sequence[str]) -> list[str]:
+    """Return the tests and topics that would decide, in words."""
     effect = CATALOGUE[rung.effect]
     missing = [name for name in ('p1', 'p2', 'x') if name not in signals]
     said = [
@@ -38,8 +38,7 @@ def decide_by(rung: Rung, signals: Sequence[str]) -> str:
         said.append(f'{", ".join(unsaid)}: record {" and ".join(missing)} too')
     elif unsaid:
         said.append(f'{", ".join(unsaid)}: play decide_by.csv and diagnose that recording too')
-    said.append(f'to confirm: {effect.confirm}')
-    return '; '.join(said)
+    return [*said, f'to confirm: {effect.confirm}']
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ import numpy as np
 from scipy.signal import periodogram
 
 from ..model.pipeline import Array
-from .bench import Bench
+from .bench import Bench, MIXED_JITTER
 from .descent import descend, walk
 from .evolution import evolve
 from .stages import Candidate, Group
@@ -260,13 +260,16 @@ class Fitter:
 
     def _settle_phase(self, group: Group, valve: Valve) -> None:
         """Find out whether p1 answers at the sample that shows the command or at the next."""
-        costs = []
+        best = []
         problem = (self.unknowns(group), group.signal, group.drive)
         for phase in (EARLY, LATE):
             values = {**valve.values, 'phase': min(phase.upper, 0.0)}
             starts = [{**values, **there} for there in grid(problem[0])]
-            costs.append(self._best_of(valve, starts, problem, 1)[0].cost)
-        self.phase = EARLY if costs[0] <= costs[1] else LATE
+            best.append(self._best_of(valve, starts, problem, 1)[0])
+        self.phase = EARLY if best[0].cost <= best[1].cost else LATE
+        values = {**best[0].values, 'phase': 0.0}
+        if self.bench.mixed_arrivals(self.bench.run(complete(values), best[0].effects)):
+            self.bench.weigh_down(MIXED_JITTER)
 
     def _best_of(
         self,

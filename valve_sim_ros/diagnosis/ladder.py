@@ -111,6 +111,13 @@ def climb(
             base_left = leftover(fitter.residuals(now, group.signal))
         before = leftover(fitter.residuals(now, group.signal))
         rung = judged(fitter, group, now, before, runners)
+        if (
+            rung
+            and now.candidates
+            and not odds.further(rung.gains[rung.effect], before, rung.closed)
+        ):
+            guess = guess or rung
+            break
         if rung is None:
             break
         if rung.closed < odds.EXPLAINED and rung.after.excess > odds.CLEAN:

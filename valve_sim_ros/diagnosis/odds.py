@@ -5,11 +5,14 @@
 from collections.abc import Mapping, Sequence
 import math
 
+from .adequacy import Leftover
 from .fitting import Valve
 from .unknowns import declared
 
 ENOUGH = 25.0
 """Least gain in half log-likelihoods of independent samples for any name."""
+MORE_ENOUGH, MORE_EXCESS, MORE_CLOSED = 60.0, 0.25, 0.6
+"""What a further effect needs: gain, excess before it, and the part of it that it closes."""
 LASTING = (
     'ip_calibration',
     'ip_nonlinearity',
@@ -60,6 +63,11 @@ def surprise(valve: Valve) -> int:
         if parameter.positive and valve.values[f'{candidate.effect}.{name}'] < parameter.neutral:
             odd += 1
     return odd
+
+
+def further(gained: float, before: Leftover, closed: float) -> bool:
+    """Tell whether there is evidence for one effect more than those already found."""
+    return gained >= MORE_ENOUGH and before.excess >= MORE_EXCESS and closed >= MORE_CLOSED
 
 
 def close_rivals(gains: Mapping[str, float], best: str) -> list[str]:

@@ -17,7 +17,7 @@ from ..model.spec import ValveSpec
 from ..recordings.recording import Recording
 from .bench import Bench
 from .conditions import Place
-from .decision import decide_by, TestSignal
+from .decision import decisions, TestSignal
 from .fitting import Valve
 from .ladder import Ladder, Outcome, Rung
 from .proof import Gap
@@ -219,7 +219,8 @@ class Diagnosis:
             'indistinguishable_from': list(rung.twins),
             'runner_up': rung.runner_up,
             'closed': rung.closed,
-            'decide_by': decide_by(rung, self.bench.signals),
+            'evidence': rung.gains[rung.effect],
+            'decide_by': '; '.join(decisions(rung, self.bench.signals)),
         }
 
     def _effect_lines(self, named: Named) -> list[str]:
@@ -233,8 +234,7 @@ class Diagnosis:
             found.append(f'  cannot be told from: {", ".join(rung.twins)}')
         if rung.runner_up:
             found.append(f'  runner-up: {rung.runner_up}')
-        found.append(f'  decide by: {decide_by(rung, self.bench.signals)}')
-        return found
+        return [*found, *(f'  decide by: {each}' for each in decisions(rung, self.bench.signals))]
 
 
 def _halves(halves: Any) -> dict[str, float | None]:

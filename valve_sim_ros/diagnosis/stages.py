@@ -74,7 +74,11 @@ class Group:
         base = [unknown for stage in self.stages for unknown in BASE_UNKNOWNS[stage]]
         if self.stages != ('u-p1',) and not (len(self.stages) == 1 and self.signal == 'x'):
             base.append(phase)
-        hidden = [name for name, stage in STAGE_OF.items() if stage in self.stages]
+        hidden = [
+            name
+            for name, stage in STAGE_OF.items()
+            if stage in self.stages and name != self.signal
+        ]
         starts = [
             start_of(f'{name}_0' + (f'.{index}' if index else ''))
             for index in range(min(stretches, 3))
