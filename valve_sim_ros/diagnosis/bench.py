@@ -80,11 +80,12 @@ class Stretch:
         period earlier, with `phase` < 0 later.
         """
         key = round(phase, 4), drive
-        if key not in self._grids:
+        found = self._grids.get(key)  # other threads may clear them meanwhile
+        if found is None:
             if len(self._grids) > KEPT_GRIDS:
                 self._grids.clear()
-            self._grids[key] = self._moved(*key)
-        return self._grids[key]
+            found = self._grids[key] = self._moved(*key)
+        return found
 
     def recount(self, counts: Mapping[str, Array]) -> None:
         """Replace what counts."""

@@ -4,6 +4,7 @@
 
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
+import math
 import os
 
 from ..model.spec import ValveSpec
@@ -140,6 +141,7 @@ def _known(valve: Valve, spec: ValveSpec | None) -> Valve:
     values = dict(spec.values)
     values['f_d/f_s'] = values['f_d'] / max(values['f_s'], 1e-9)
     values['a_1/a_2'] = values['a_1'] / values['a_2']
+    values['damping'] = values['a_2'] / (2.0 * math.sqrt(values['a_1']))
     return replace(valve, values={**valve.values, **values}, effects=spec.effects)
 
 

@@ -3,9 +3,11 @@
 """Fits of one group of stages: the base valve, and the base valve with a candidate effect."""
 
 from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
-from itertools import product
+from itertools import product, repeat
 import math
+import os
 
 import numpy as np
 from scipy.signal import periodogram
@@ -23,7 +25,8 @@ START: dict[str, float] = {
     'T_g2': 5.0,
     'f_s': 4.0,
     'f_d/f_s': 0.6,
-    'a_1/a_2': 10.0,
+    'a_1/a_2': 12.0,
+    'damping': 1.8,
     'phase': 0.0,
 }
 GRID: dict[str, tuple[float, ...]] = {
@@ -190,24 +193,29 @@ class Fitter:
         """
         rugged = 'p2-x' in group.stages
         residual = self.residuals(valve, group.signal, self.drive) if rugged else np.zeros(0)
-        runners = []
-        for index, candidate in enumerate(candidates):
-            runners.append(self._screen(candidate, group, valve, residual))
-            progress(0.5 * (index + 1) / len(candidates))
-        for left, generations in ROUNDS if rugged else ():
-            runners = sorted(runners, key=_cost)
-            for index, runner in enumerate(runners[:left]):
-                problem = self.problem(group, runner)
-                more = self.evolve(runner, problem, generations)
-                runners[index] = min(runner, more, key=_cost)
-        runners = sorted(runners, key=_cost)
-        for index, runner in enumerate(runners[:FINISHERS]):
-            runners[index] = self.fit(runner, self.problem(group, runner))
-            progress(0.5 + 0.5 * (index + 1) / FINISHERS)
-        runners = sorted(runners, key=_cost)
-        for index, runner in enumerate(runners[:REFINED] if rugged else ()):
-            runners[index] = self.refined(runner, self.problem(group, runner))
-        return sorted(runners, key=_cost)
+        done, total = 0, len(candidates) + FINISHERS
+
+        def count(runner: Valve) -> Valve:
+            nonlocal done
+            done += 1
+            progress(min(done / total, 1.0))
+            return runner
+
+        def evolved(runner: Valve, generations: int) -> Valve:
+            more = self.evolve(runner, self.problem(group, runner), generations)
+            return min(runner, more, key=_cost)
+
+        with ThreadPoolExecutor(os.cpu_count()) as pool:  # compiled runs release the lock
+            screened = pool.map(lambda c: self._screen(c, group, valve, residual), candidates)
+            runners = sorted((count(each) for each in screened), key=_cost)
+            for left, generations in ROUNDS if rugged else ():
+                first = pool.map(evolved, runners[:left], repeat(generations))
+                runners = sorted([*first, *runners[left:]], key=_cost)
+            first = pool.map(lambda r: self.fit(r, self.problem(group, r)), runners[:FINISHERS])
+            runners = sorted([*map(count, first), *runners[FINISHERS:]], key=_cost)
+            last = REFINED if rugged else 0
+            first = pool.map(lambda r: self.refined(r, self.problem(group, r)), runners[:last])
+            return sorted([*first, *runners[last:]], key=_cost)
 
     def rebased(self, group: Group, valve: Valve, runners: Sequence[Valve]) -> Valve:
         """Return the valve without a further effect, refitted from where the runners ended."""
@@ -324,7 +332,7 @@ def friction_grid(group: Group) -> list[dict[str, float]]:
     if 'p2-x' not in group.stages:
         return []
     return [
-        {'f_s': f_s, 'f_d/f_s': share, 'a_1/a_2': START['a_1/a_2']}
+        {'f_s': f_s, 'f_d/f_s': share, 'a_1/a_2': START['a_1/a_2'], 'damping': START['damping']}
         for f_s in GRID['f_s']
         for share in GRID['f_d/f_s']
     ]

@@ -50,10 +50,11 @@ BASE_UNKNOWNS: dict[str, tuple[Unknown, ...]] = {
     'p2-x': (
         _log('f_s', 0.01, DECLARED['f_s'].upper),
         Unknown('f_d/f_s', 0.0, 1.0, 'linear', 0.03),
-        _log('a_1/a_2', 0.05, 300.0, 0.1),
+        _log('a_1/a_2', 0.05, 80.0, 0.1),
+        _log('damping', 0.4, 5.0, 0.1),
     ),
 }
-"""The base valve's unknowns by stage; a_1 follows from a_1/a_2, see `complete`."""
+"""The base valve's unknowns by stage; `damping` is a_2 / (2 sqrt(a_1))."""
 PHASE = Unknown('phase', -1.0, 0.999, 'linear', 0.1)
 """Share of a sample period by which a command acts before the sample that shows it."""
 EARLY = Unknown('phase', 0.0, 0.999, 'linear', 0.1)
@@ -84,13 +85,9 @@ def declared(effect: str, name: str) -> EffectParameter:
 
 
 def complete(values: Mapping[str, float]) -> dict[str, float]:
-    """Return values with f_d, a_1 and a_2 worked out from what the fits vary.
-
-    a_1 is held where the paper has it, or higher where the stem would else overshoot: at the
-    usual sample times only a_1/a_2 can be seen (models.md sec. 6).
-    """
+    """Return values with f_d, a_1 and a_2 worked out from what the fits vary."""
     ratio = values['a_1/a_2']
-    a_1 = max(DECLARED['a_1'].default, 6.0 * ratio * ratio)
+    a_1 = (2.0 * values['damping'] * ratio) ** 2
     return {
         **values,
         'f_d': values['f_s'] * values['f_d/f_s'],

@@ -1,0 +1,148 @@
+# Copyright 2026 The valve_sim_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The parts of the diagnosis, each held against what is known."""
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+
+from valve_sim_ros import simulate
+from valve_sim_ros.diagnosis.adequacy import leftover
+from valve_sim_ros.diagnosis.bench import Bench
+from valve_sim_ros.diagnosis.conditions import places
+from valve_sim_ros.diagnosis.decision import TestSignal
+from valve_sim_ros.diagnosis.descent import cost_of, descend, walk
+from valve_sim_ros.diagnosis.evolution import evolve
+from valve_sim_ros.diagnosis.proof import closed
+from valve_sim_ros.diagnosis.stages import groups
+from valve_sim_ros.diagnosis.unknowns import complete
+from valve_sim_ros.model.effects import CATALOGUE
+from valve_sim_ros.recordings.recording import Recording
+
+VALUES = {
+    'f_d1': 0.5,
+    'T_g1': 2.0,
+    'T_g2': 5.0,
+    'f_s': 4.0,
+    'f_d/f_s': 0.6,
+    'a_1/a_2': 10.0,
+    'damping': 1.8,
+    'phase': 0.0,
+}
+
+
+def commands(n=1500):
+    rng = np.random.default_rng(5)
+    return np.concatenate([np.zeros(20), np.repeat(rng.uniform(10.0, 90.0, n // 50), 50)])
+
+
+def recording(noise=0.0, **effects):
+    u = commands()
+    values = {name: v for name, v in complete(VALUES).items() if '/' not in name}
+    values = {n: v for n, v in values.items() if n not in ('phase', 'damping')}
+    s = simulate(
+        u, parameters={**values, 'effects': list({e.split('.')[0] for e in effects}), **effects}
+    )
+    rng = np.random.default_rng(1)
+    noisy = {
+        name: getattr(s, name) + noise * rng.standard_normal(u.size) for name in ('p1', 'p2', 'x')
+    }
+    return Recording(s.t, u, **noisy)
+
+
+def test_the_bench_runs_the_same_valve_as_simulate():
+    record = recording()
+    bench = Bench([record])
+    (result,) = bench.run(complete({**VALUES, 'p1_0': 0.0, 'p2_0': 0.0, 'x_0': 0.0}))
+    for row, name in enumerate(('p1', 'p2', 'x')):
+        np.testing.assert_allclose(result[row], record.output(name), rtol=0, atol=1e-9)
+
+
+def test_a_phase_moves_commands_between_samples():
+    bench = Bench([recording()])
+    on_time, half, whole = (
+        bench.run(complete({**VALUES, 'phase': phase, 'p1_0': 0.0, 'p2_0': 0.0, 'x_0': 0.0}))[0][1]
+        for phase in (0.0, 0.5, 0.999)
+    )
+    np.testing.assert_allclose(whole[:-1], on_time[1:], rtol=0, atol=0.1)
+    assert np.abs(half - 0.5 * (on_time + whole)).max() < 0.2 * np.abs(whole - on_time).max()
+
+
+def test_score_is_the_robust_square_of_the_residual_and_stops_at_its_bound():
+    bench = Bench([recording(noise=0.2)])
+    values = complete({**VALUES, 'f_s': 5.0})
+    residual = np.nan_to_num(bench.residual(bench.run(values), 'x'))
+    whole = bench.score(values, (), 'x')
+    assert whole == pytest.approx(cost_of(residual), rel=1e-9)
+    assert 0.1 * whole < bench.score(values, (), 'x', bound=0.1 * whole) < whole
+
+
+@pytest.mark.parametrize('colour', [0.0, 0.5, 0.75])
+def test_noise_of_any_colour_leaves_no_excess(colour):
+    rng = np.random.default_rng(2)
+    noise = lfilter([np.sqrt(1 - colour**2)], [1, -colour], rng.standard_normal(5000))
+    assert leftover(noise).excess < 0.25
+
+
+def test_a_misfit_in_a_tenth_of_the_time_is_an_excess():
+    rng = np.random.default_rng(2)
+    misfit = np.where(np.arange(5000) % 1000 < 100, 4.0, 0.0)
+    left = leftover(rng.standard_normal(5000) + misfit)
+    assert left.excess == pytest.approx(1.6, abs=0.4)
+
+
+def test_the_place_of_a_misfit_is_found():
+    record = recording(noise=0.2)
+    bench = Bench([record])
+    results = bench.run(complete({**VALUES, 'p1_0': 0.0, 'p2_0': 0.0, 'x_0': 0.0}))
+    filling = results[0][0] > results[0][1] + 0.5
+    rng = np.random.default_rng(3)
+    residual = rng.standard_normal(filling.size) + 5.0 * filling
+    found = places(bench, 'p1-p2', 'p2', residual, results)
+    assert found[0].condition == 'while p2 fills'
+    assert found[0].share_of_gap > 0.9
+    assert all(a <= b for a, b in found[0].spans)
+
+
+def test_groups_follow_the_measured_signals():
+    assert [(g.signal, g.stages) for g in groups(('p1', 'x'))] == [
+        ('p1', ('u-p1',)),
+        ('x', ('p1-p2', 'p2-x')),
+    ]
+
+
+def test_every_effect_is_a_candidate_somewhere():
+    named = {c.effect for group in groups(('p1', 'p2', 'x')) for c in group.candidates()}
+    assert named == set(CATALOGUE)
+    assert {c.effect for c in groups(('x',))[0].candidates()} == set(CATALOGUE)
+    assert 'air_leak' not in {c.effect for c in groups(('x',))[0].candidates(['air_leak'])}
+
+
+def test_searches_find_the_bottom_of_a_crooked_valley():
+    def residuals(point):
+        return np.array([point[0] - 3.0, 2.0 * (point[1] - point[0] ** 2 / 3.0)])
+
+    def cost(point, bound=np.inf):
+        return cost_of(residuals(point))
+
+    slope = descend(residuals, np.zeros(2), 40)
+    np.testing.assert_allclose(walk(cost, slope).point, [3.0, 3.0], atol=0.2)
+    rng = np.random.default_rng(0)
+    np.testing.assert_allclose(
+        evolve(cost, np.zeros(2), 2.0, rng, 60, 10).point, [3.0, 3.0], atol=0.05
+    )
+
+
+def test_the_gap_closed():
+    assert closed(2.0, 1.0, 1.0) == 1.0
+    assert closed(2.0, 2.0, 1.0) == 0.0
+    assert closed(np.sqrt(5.0), np.sqrt(2.0), 1.0) == pytest.approx(0.75)
+    assert closed(1.0, 1.0, 1.0) is None
+
+
+def test_the_deciding_commands_reach_both_stops_and_rest():
+    signal = TestSignal.of(recording())
+    assert signal.u.min() == 0.0
+    assert signal.u.max() == 100.0
+    assert np.all(np.diff(signal.time) > 0.0)
+    assert signal.csv().splitlines()[0] == 't,u'
