@@ -117,6 +117,7 @@ class Wall(Pacing):
         clock = Clock(clock_type=ClockType.STEADY_TIME)
         self._origin = time.monotonic_ns()
         self._last: int | None = None
+        self._owed = 0
         self._node.create_timer(self._period, self._tick, clock=clock)
 
     def _tick(self) -> None:
@@ -125,14 +126,17 @@ class Wall(Pacing):
             return
         # the timer keeps to its grid, which began at the origin
         index = self._index()
-        if self._last is not None:  # time before the first tick was the making of other nodes
-            self.missed_periods += max(index - self._last - 1, 0)
-            index = max(index, self._last)
-        self._last = index
+        if self._last is None:  # time before the first tick was the making of other nodes
+            self._last = index
+        elif index > self._last:
+            self.missed_periods += self._owed
+            self._owed, self._last = index - self._last - 1, index
+        else:  # two ticks in one period: the sample before was late, not lost
+            self._owed = max(self._owed - 1, 0)
         self._take()
 
     def _skip_pause(self) -> None:
-        self._last = self._index()
+        self._last, self._owed = self._index(), 0
 
     def _index(self) -> int:
         """Return the number of the period that is running."""
