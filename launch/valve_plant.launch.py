@@ -40,6 +40,17 @@ ARGUMENTS = [
         description='Step with the time on /clock instead of the wall clock.',
     ),
     DeclareLaunchArgument(
+        'pacing',
+        default_value='auto',
+        choices=['auto', 'wall', 'sim_time', 'own_clock', 'lockstep'],
+        description='What drives the samples, see doc/time.md; auto: /clock or the wall clock.',
+    ),
+    DeclareLaunchArgument(
+        'command_timeout',
+        default_value='0.0',
+        description='Age of the command at which fail_action takes over [s]; 0: never.',
+    ),
+    DeclareLaunchArgument(
         'log_level',
         default_value='info',
         choices=['debug', 'info', 'warn', 'error', 'fatal'],
@@ -56,7 +67,15 @@ def generate_launch_description():
         namespace=LaunchConfiguration('namespace'),
         parameters=[
             LaunchConfiguration('params_file'),
-            {'use_sim_time': ParameterValue(LaunchConfiguration('use_sim_time'), value_type=bool)},
+            {
+                'use_sim_time': ParameterValue(
+                    LaunchConfiguration('use_sim_time'), value_type=bool
+                ),
+                'pacing': LaunchConfiguration('pacing'),
+                'command_timeout': ParameterValue(
+                    LaunchConfiguration('command_timeout'), value_type=float
+                ),
+            },
         ],
         arguments=['--ros-args', '--log-level', LaunchConfiguration('log_level')],
         output='screen',

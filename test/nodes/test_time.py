@@ -16,6 +16,7 @@ from rosgraph_msgs.msg import Clock
 from std_srvs.srv import SetBool, Trigger
 
 from valve_sim_ros import ModelError, simulate
+from valve_sim_ros.nodes.pacing import Wall
 from valve_sim_ros.nodes.valve_plant import ValvePlant
 
 pytestmark = pytest.mark.ros
@@ -185,3 +186,18 @@ def test_pause_step_reset(bench):
     assert peer.heard['x'][1] == pytest.approx(70.0)
     assert bench.call(SetBool, '/valve_plant/pause', data=False).success
     bench.until(lambda: plant.samples > 10)
+
+
+def test_late_samples_are_not_counted_as_missed(bench, monkeypatch):
+    taken = []
+    wall = Wall(bench.add(Node('ticks')), 3600.0, lambda: taken.append(1))
+    wall.start(lambda back: None)
+    # the period in which each tick runs: 7 comes late, in 8; 10 to 12 never come
+    ticks = [5, 6, 8, 8, 9, 13, 14]
+    periods = iter(ticks)
+    monkeypatch.setattr(wall, '_index', lambda: next(periods))
+    for _ in ticks:
+        wall._tick()
+    assert len(taken) == len(ticks)
+    assert wall.missed_periods == 3
+    assert len(taken) + wall.missed_periods == ticks[-1] - ticks[0] + 1

@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..identification.fitness import fitness
+from ..identification.stretches import noise_of, Stretch
 from ..model.effects import CATALOGUE
 from ..model.pipeline import Array
 from ..model.simulation import InitialState, Valve
@@ -103,8 +104,10 @@ class Comparison:
 
     def noise(self) -> Values:
         """Return the noise of p1, p2, x [% of span] from second differences, robustly."""
-        bends = np.abs(np.diff(self._ordered()[:, 2:5], 2, axis=0))
-        return tuple(_median(bends[:, k]) / (0.6745 * math.sqrt(6.0)) for k in range(3))  # type: ignore[return-value]
+        rows = self._ordered()
+        measured = {name: rows[:, 2 + k] for k, name in enumerate(OUTPUTS)}
+        heard = [Stretch(rows[:, 1], rows[:, 0], measured, 0)]
+        return tuple(noise_of(heard, name) for name in OUTPUTS)  # type: ignore[return-value]
 
     def residual(self, seconds: float) -> Values:
         """Return the root mean square of each stage's residual over the last `seconds`."""
@@ -168,11 +171,6 @@ def _copies(spec: ValveSpec) -> tuple[ValveSpec, ValveSpec, ValveSpec]:
 
 def _known(measured: float, otherwise: float) -> float:
     return measured if math.isfinite(measured) else otherwise
-
-
-def _median(values: Array) -> float:
-    known = values[np.isfinite(values)]
-    return float(np.median(known)) if known.size else 0.0
 
 
 def _mean(values: Array) -> float:

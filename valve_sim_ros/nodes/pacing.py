@@ -115,7 +115,9 @@ class Wall(Pacing):
     def start(self, jumped: Callable[[bool], None]) -> None:
         """Make the timer."""
         clock = Clock(clock_type=ClockType.STEADY_TIME)
-        self._origin, self._last = time.monotonic_ns(), 0
+        self._origin = time.monotonic_ns()
+        self._last: int | None = None
+        self._owed = 0
         self._node.create_timer(self._period, self._tick, clock=clock)
 
     def _tick(self) -> None:
@@ -123,13 +125,22 @@ class Wall(Pacing):
         if self.paused:
             return
         # the timer keeps to its grid, which began at the origin
-        index = int((time.monotonic_ns() - self._origin) * 1e-9 / self._period)
-        self.missed_periods += max(index - self._last - 1, 0)
-        self._last = max(index, self._last)
+        index = self._index()
+        if self._last is None:  # time before the first tick was the making of other nodes
+            self._last = index
+        elif index > self._last:
+            self.missed_periods += self._owed
+            self._owed, self._last = index - self._last - 1, index
+        else:  # two ticks in one period: the sample before was late, not lost
+            self._owed = max(self._owed - 1, 0)
         self._take()
 
     def _skip_pause(self) -> None:
-        self._last = int((time.monotonic_ns() - self._origin) * 1e-9 / self._period)
+        self._last, self._owed = self._index(), 0
+
+    def _index(self) -> int:
+        """Return the number of the period that is running."""
+        return int((time.monotonic_ns() - self._origin) * 1e-9 / self._period)
 
 
 class OwnClock(Pacing):
@@ -151,7 +162,7 @@ class OwnClock(Pacing):
 
     def start(self, jumped: Callable[[bool], None]) -> None:
         """Make the wall timer that looks what is due."""
-        self._origin = time.monotonic()
+        self._origin: float | None = None
         clock = Clock(clock_type=ClockType.STEADY_TIME)
         self._node.create_timer(max(self._wall_period, 1e-3), self._tick, clock=clock)
 
@@ -161,12 +172,15 @@ class OwnClock(Pacing):
         self._clock.publish(ClockMessage(clock=stamp))
         self._take()
         self._samples += 1
-        self._origin += self._wall_period
+        if self._origin is not None:
+            self._origin += self._wall_period
 
     def _tick(self) -> None:
         """Take what is due since the last sample, at most some 20 ms of it at a time."""
         if self.paused:
             return
+        if self._origin is None:  # time before the first tick was the making of other nodes
+            self._origin = time.monotonic() - self._wall_period
         due = int((time.monotonic() - self._origin) / self._wall_period)
         lost = due - max(1, round(CATCH_UP / self._wall_period))
         if lost > 0:

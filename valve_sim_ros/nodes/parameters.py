@@ -14,6 +14,7 @@ from rclpy.parameter import Parameter as RosParameter
 from ..model.declarations import Option, Parameter
 from ..model.effects import CATALOGUE
 from ..model.errors import ModelError
+from ..model.parameter_file import NODE_ONLY
 from ..model.parameters import BRANCH, SAMPLE_TIME
 from ..model.spec import BASE_MODEL, EFFECTS, MODEL, ValveSpec
 from . import watchdog
@@ -203,8 +204,9 @@ class ValveParameters(Settings):
         most = ValveSpec(model=self._model, effects=tuple(CATALOGUE) if base else ())
         declared: tuple[Declaration, ...] = (*most.parameters, BRANCH)
         names = [one.name for one in declared]
-        others = (one.name for one in (MODEL, *fixed, *live))
-        refuse_unknown(node, [*names, EFFECTS, *others])
+        others = [one.name for one in (MODEL, *fixed, *live)]
+        # one file may serve a plant and the twin beside it
+        refuse_unknown(node, [*names, EFFECTS, *others, *NODE_ONLY])
         self._held: dict[str, Any] = {one.name: declare(node, one) for one in declared}
         self._held[EFFECTS] = declare(node, EFFECT_NAMES)
         given = node._parameter_overrides.keys() & self._held.keys()

@@ -2,11 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """For the tests of other packages: a lockstep valve in the test's own process, over real DDS.
 
-In a conftest.py::
+In a test module, or with ``from valve_sim_ros.testing import lockstep_valve`` in a conftest.py::
 
-    from valve_sim_ros.testing import lockstep_valve  # noqa: F401
-
-In a test::
+    pytest_plugins = 'valve_sim_ros.testing.fixtures'
 
     def test_my_controller(lockstep_valve):
         valve = lockstep_valve({'f_s': 9.0}, sample_time=0.1)

@@ -180,6 +180,8 @@ class LockstepValve:
         """Spin until `done`; fail if no sample came for too long."""
         count, end = len(self.samples), time.monotonic() + self._patience
         while not done():
+            if not self.plant.context.ok():
+                raise RuntimeError('ROS was shut down during the test, e.g. by a signal')
             self._executor.spin_once(timeout_sec=0.1)
             if len(self.samples) > count:
                 count, end = len(self.samples), time.monotonic() + self._patience
