@@ -8,7 +8,6 @@ import sys
 from typing import Any
 
 from rcl_interfaces.msg import IntegerRange, ParameterDescriptor
-from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
 from rclpy.parameter import Parameter as RosParameter
 from rclpy.utilities import remove_ros_args
