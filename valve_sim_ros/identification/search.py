@@ -57,7 +57,7 @@ def search(problem: Problem, seed: int = 0, watch: Watch | None = None) -> End:
     """
     watch = watch or Watch()
     best = _race(problem, seed, watch)
-    if best.cost > SUSPECT * np.count_nonzero(best.residuals):
+    if doubted(best):
         best = best_of([best, _race(problem, seed + 1, watch)], 1)[0]
     return best
 
@@ -72,13 +72,18 @@ def _race(problem: Problem, seed: int, watch: Watch) -> End:
         blurred = View(problem, watch, width)
         ends = [blurred.descend(end.point, STRIDES, COARSE) for end in runners]
         runners = distinct(ends, places)
-    best = polish(problem, runners[0].point, watch)
-    for _ in range(ROUNDS):
-        hopped = _hop(problem, view, best)
-        if hopped.cost > best.cost * (1.0 - GAIN):
-            break
-        best = hopped
-    return best
+    return _hops(problem, polish(problem, runners[0].point, watch), watch)
+
+
+def refit(problem: Problem, point: Array, watch: Watch | None = None) -> End:
+    """Go down from the optimum of much the same data; hop only if it stays above the noise."""
+    end = polish(problem, point, watch)
+    return _hops(problem, end, watch or Watch()) if doubted(end) else end
+
+
+def doubted(end: End) -> bool:
+    """Tell whether residuals are larger than noise alone would leave them."""
+    return end.cost > SUSPECT * np.count_nonzero(end.residuals)
 
 
 def polish(
@@ -96,6 +101,17 @@ def polish(
         if width == 1:
             ends.append(end)
     return best_of(ends, 1)[0]
+
+
+def _hops(problem: Problem, best: End, watch: Watch) -> End:
+    """Leave the optimum and go down again until nothing is further down."""
+    view = View(problem, watch)
+    for _ in range(ROUNDS):
+        hopped = _hop(problem, view, best)
+        if hopped.cost > best.cost * (1.0 - GAIN):
+            break
+        best = hopped
+    return best
 
 
 def _hop(problem: Problem, view: View, best: End) -> End:
