@@ -83,7 +83,7 @@ def refit(problem: Problem, point: Array, watch: Watch | None = None) -> End:
 
 def doubted(end: End) -> bool:
     """Tell whether residuals are larger than noise alone would leave them."""
-    return end.cost > SUSPECT * np.count_nonzero(end.residuals)
+    return end.cost > SUSPECT * int(np.count_nonzero(end.residuals))
 
 
 def polish(
