@@ -14,7 +14,7 @@ from ..recordings.recording import OUTPUTS
 from .errors import IdentificationError
 from .fitness import fitness
 from .problem import Problem
-from .search import polish
+from .search import refit
 from .stretches import Mask
 from .uncertainty import Estimate
 from .watch import Watch
@@ -97,7 +97,7 @@ def hold_out(
 ) -> HoldOut:
     """Fit again without the samples in `masks`, starting from the fit to all."""
     rest = problem.withheld([~mask for mask in masks])
-    found = polish(rest, point, watch).point
+    found = refit(rest, point, watch).point
     # the data left do not see a start that is held out: it has to be given
     found = rest.with_starts(found, point, masks)
     outputs = rest.simulate(found)

@@ -7,7 +7,7 @@ import copy
 
 import numpy as np
 
-from ..model.parameters import BASE, BRANCH
+from ..model.parameters import BRANCH
 from ..model.pipeline import Array
 from ..model.simulation import drive, InitialState, machine
 from ..model.spec import ValveSpec
@@ -49,7 +49,6 @@ class Problem:
         branch: str = BRANCH.default,
         *,
         signals: Sequence[str] | None = None,
-        effects: Sequence[str] = (),
     ) -> None:
         """Collect the stretches and weigh each signal by its noise.
 
@@ -61,15 +60,13 @@ class Problem:
             Form of the condition of eq. (5).
         signals : sequence of str, optional
             Outputs to fit; all that are measured by default.
-        effects : sequence of str
-            Effects to add to the valve, all their parameters being unknown.
 
         Raises
         ------
         IdentificationError
             If an output is not measured, or u or an output is constant.
         """
-        self.branch, self.effects = branch, tuple(effects)
+        self.branch = branch
         self.signals = _chosen(recordings, signals)
         self.stretches = stretches_of(recordings, self.signals)
         refuse_flat(self.stretches, self.signals)
@@ -77,8 +74,7 @@ class Problem:
         steps = [s.dt[1:] for s in self.stretches]
         self.sample_time = float(np.median(np.concatenate(steps)))
         self.duration = float(sum(s.dt.sum() for s in self.stretches))
-        self._extra = ValveSpec(effects=self.effects).parameters[len(BASE) :]
-        self.unknowns = valve_unknowns(self.sample_time, self.duration, extra=self._extra)
+        self.unknowns = valve_unknowns(self.sample_time, self.duration)
         self._started = _longest(self.stretches, MOST_STARTS)
         self._kinds = tuple(
             OUTPUTS.index(name)
@@ -108,7 +104,7 @@ class Problem:
 
     def spec(self, point: Array) -> ValveSpec:
         """Return the valve at `point`."""
-        return ValveSpec(self.values(point), self.branch, effects=self.effects)
+        return ValveSpec(self.values(point), self.branch)
 
     def simulate(self, point: Array) -> list[Array]:
         """Return p1, p2, x, shape (3, n), for each stretch."""
@@ -168,7 +164,7 @@ class Problem:
     def with_free_a_1(self) -> 'Problem':
         """Return a copy in which a_1 is searched too, the last of the unknowns."""
         other = copy.copy(self)
-        other.unknowns = valve_unknowns(self.sample_time, self.duration, True, self._extra)
+        other.unknowns = valve_unknowns(self.sample_time, self.duration, free_a_1=True)
         other.size = self.size + 1
         return other
 

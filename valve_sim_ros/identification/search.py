@@ -34,6 +34,8 @@ HOP_WIDTH = 8
 PROMISING = 1.3
 """A hop that ends within this factor of the best cost is polished."""
 GAIN = 1e-6
+SUSPECT = 1.04
+"""Mean square of the residuals over the noise above which the optimum is doubted."""
 
 
 def search(problem: Problem, seed: int = 0, watch: Watch | None = None) -> End:
@@ -41,7 +43,8 @@ def search(problem: Problem, seed: int = 0, watch: Watch | None = None) -> End:
 
     Staged starts from the physics and the best of a Sobol sequence race down through blurs that
     fade; the winner is polished on the sharp cost, then tries hops along each unknown's ridge
-    until none leads further down.
+    until none leads further down. If it does not come down to the noise, a second race from
+    other blind starts checks it.
 
     Parameters
     ----------
@@ -53,6 +56,14 @@ def search(problem: Problem, seed: int = 0, watch: Watch | None = None) -> End:
         Told of every simulation; what its callback raises goes through.
     """
     watch = watch or Watch()
+    best = _race(problem, seed, watch)
+    if doubted(best):
+        best = best_of([best, _race(problem, seed + 1, watch)], 1)[0]
+    return best
+
+
+def _race(problem: Problem, seed: int, watch: Watch) -> End:
+    """Race the best starts; polish the winner and let it hop."""
     view = View(problem, watch)
     staged = [view.scored(point) for point in staged_starts(problem)]
     blind = [view.scored(point) for point in _blind(problem, seed)]
@@ -61,13 +72,18 @@ def search(problem: Problem, seed: int = 0, watch: Watch | None = None) -> End:
         blurred = View(problem, watch, width)
         ends = [blurred.descend(end.point, STRIDES, COARSE) for end in runners]
         runners = distinct(ends, places)
-    best = polish(problem, runners[0].point, watch)
-    for _ in range(ROUNDS):
-        hopped = _hop(problem, view, best)
-        if hopped.cost > best.cost * (1.0 - GAIN):
-            break
-        best = hopped
-    return best
+    return _hops(problem, polish(problem, runners[0].point, watch), watch)
+
+
+def refit(problem: Problem, point: Array, watch: Watch | None = None) -> End:
+    """Go down from the optimum of much the same data; hop only if it stays above the noise."""
+    end = polish(problem, point, watch)
+    return _hops(problem, end, watch or Watch()) if doubted(end) else end
+
+
+def doubted(end: End) -> bool:
+    """Tell whether residuals are larger than noise alone would leave them."""
+    return end.cost > SUSPECT * int(np.count_nonzero(end.residuals))
 
 
 def polish(
@@ -85,6 +101,17 @@ def polish(
         if width == 1:
             ends.append(end)
     return best_of(ends, 1)[0]
+
+
+def _hops(problem: Problem, best: End, watch: Watch) -> End:
+    """Leave the optimum and go down again until nothing is further down."""
+    view = View(problem, watch)
+    for _ in range(ROUNDS):
+        hopped = _hop(problem, view, best)
+        if hopped.cost > best.cost * (1.0 - GAIN):
+            break
+        best = hopped
+    return best
 
 
 def _hop(problem: Problem, view: View, best: End) -> End:

@@ -2,13 +2,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a fit searches for, and how it walks: each unknown as a share from 0 to 1 of its range."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 import math
 
 import numpy as np
 
-from ..model.declarations import Parameter
 from ..model.parameters import BASE
 from ..model.pipeline import Array
 
@@ -100,26 +99,16 @@ class Unknowns:
     def point(self, values: Mapping[str, float]) -> Array:
         """Return the shares of parameter values, clipped to the range; shape (len(self),).
 
-        What is not given has its default, an effect's parameter the middle of its range.
+        What is not given has its default.
         """
-        known = {unknown.name: unknown.value(0.5) for unknown in self.each}
-        known |= {name: declared.default for name, declared in DECLARED.items()}
-        known |= values
+        known = {name: declared.default for name, declared in DECLARED.items()} | dict(values)
         known[RATIO] = values.get(RATIO, known['a_1'] / known['a_2'])
         known['f_d'] = known['f_d'] / known['f_s'] if known['f_s'] > 0.0 else 0.5
         return np.array([unknown.share(known[unknown.name]) for unknown in self.each])
 
 
-def valve_unknowns(
-    sample_time: float,
-    duration: float,
-    free_a_1: bool = False,
-    extra: Sequence[Parameter] = (),
-) -> Unknowns:
-    """Return the unknowns of a valve for records of this sample time and length [s].
-
-    `extra` are parameters of effects that are searched too, under their full names.
-    """
+def valve_unknowns(sample_time: float, duration: float, free_a_1: bool = False) -> Unknowns:
+    """Return the unknowns of a valve for records of this sample time and length [s]."""
     fastest, slowest = FASTEST * sample_time, max(SLOWEST * duration, sample_time)
     each = []
     for name in ('f_d1', 'T_g1', 'T_g2', 'f_s'):
@@ -132,7 +121,6 @@ def valve_unknowns(
         )
     each.append(Unknown('f_d', DECLARED['f_d'].unit, 0.0, 1.0, 'linear'))
     each.append(Unknown(RATIO, '1/s', *RATIO_BOUNDS, 'log'))
-    each += [Unknown(p.name, p.unit, p.lower, p.upper, p.scale) for p in extra]
     if free_a_1:
         declared = DECLARED['a_1']
         each.append(Unknown('a_1', declared.unit, *A_1_BOUNDS, 'log'))
