@@ -20,6 +20,14 @@ from .options import topic_option, topics_by_signal
     help='Folder with .msg files, for bags that do not define their types; repeatable.',
 )
 @click.option(
+    '--time',
+    'time_source',
+    type=click.Choice(['received', 'sent', 'header']),
+    default='received',
+    show_default=True,
+    help='Which stamps of a bag are the time of a message.',
+)
+@click.option(
     '--signal', type=click.Path(path_type=Path), help='Write the recommended commands to this CSV.'
 )
 @click.option(
@@ -35,6 +43,7 @@ def doctor_command(
     data: tuple[Path, ...],
     topics: tuple[str, ...],
     folders: tuple[Path, ...],
+    time_source: str,
     signal: Path | None,
     limits: tuple[float, float],
 ) -> None:
@@ -50,9 +59,14 @@ def doctor_command(
         raise click.UsageError('give a bag or CSV file, or --signal FILE')
     examinations = []
     for path in data:
-        recording = read_recording(path, topics_by_signal(topics), message_folders=folders)
+        recording = read_recording(
+            path,
+            topics_by_signal(topics),
+            message_folders=folders,
+            time_source=time_source,
+        )
         examinations.append(examine(recording))
-        click.echo(f'{path}:')
+        click.echo(f'{path} (time: {recording.provenance.time_source}):')
         for line in examinations[-1].lines():
             click.echo(f'  {line}')
     best = together(examinations) if examinations else ()
