@@ -9,6 +9,7 @@ PYTHON ?= python3
 PYTEST_ARGS ?=
 DEMO_ARGS ?=
 BLIND_ARGS ?=
+STUDY_ARGS ?=
 UV_VERSION := 0.13.8
 
 ifeq ($(filter $(DISTRO),jazzy kilted),)
@@ -38,8 +39,8 @@ unexport NUMBA_DISABLE_JIT
 ISOLATED = logs=$$(mktemp -d) && trap 'rm -rf "$$logs"' EXIT && export ROS_LOG_DIR=$$logs \
 	ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST ROS_DOMAIN_ID=$$(( $$$$ % 101 + 1 )) &&
 
-.PHONY: help demo test lint format bench blind blind-tuning starts coverage lower-bounds colcon
-.PHONY: lock clean check-python
+.PHONY: help demo test lint format bench blind blind-tuning starts coverage ragged lower-bounds
+.PHONY: colcon lock clean check-python
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
 
@@ -79,6 +80,9 @@ starts: $(VENV)/.ready  ## does the search find the optimum of 100 random valves
 
 coverage: $(VENV)/.ready  ## do 95 % intervals hold the truth 95 times in 100? (200 runs)
 	@$(BIN)/python studies/interval_coverage.py
+
+ragged: $(VENV)/.ready  ## do they hold it too with 5 % of the samples lost and 10 % jitter?
+	@$(BIN)/python studies/ragged_recordings.py $(STUDY_ARGS)
 
 lower-bounds: $(LOWER)/.ready  ## the fast tests on the oldest supported libraries
 	@$(CURDIR)/$(LOWER)/bin/python -m pytest -m 'not slow' --ignore=test/test_packaging.py $(PYTEST_ARGS)

@@ -7,6 +7,7 @@ import importlib.util
 from pathlib import Path
 import shutil
 import sqlite3
+import struct
 
 import numpy as np
 import pytest
@@ -14,6 +15,8 @@ from recorded import faults, Truth
 
 from valve_sim_ros import read_recording, RecordingError
 from valve_sim_ros.recordings.bag_files import storage_files
+from valve_sim_ros.recordings.mcap_file import CHUNK, HEAD, MAGIC, MESSAGE
+from valve_sim_ros.recordings.storage import zstd
 
 DATA = Path(__file__).parents[1] / 'data'
 LAST = 233
@@ -246,3 +249,49 @@ def test_an_old_bag_without_definitions_takes_them_from_a_folder(truth, tmp_path
     np.testing.assert_allclose(found.x, truth.x, atol=1e-4)
     with pytest.raises(RecordingError, match='no such folder'):
         read_recording(path, topics, message_folders=[tmp_path / 'nowhere'])
+
+
+def test_send_and_receive_stamps_are_compared_and_either_can_be_the_time(truth, tmp_path):
+    path = tmp_path / 'sent.mcap'
+    content = bytearray(zstd.decompress((DATA / 'jitter.mcap.zstd').read_bytes()))
+    sent_earlier(content, int(1.7e9))
+    path.write_bytes(bytes(content))
+    received = read_recording(path)
+    assert received.provenance.time_source == 'received'
+    assert 'received 1.7 s after it was sent' in notes(received)
+    sent = read_recording(path, time_source='sent')
+    assert sent.provenance.time_source == 'sent'
+    assert received.provenance.start - sent.provenance.start == pytest.approx(1.7e9, abs=1e8)
+    np.testing.assert_array_equal(sent.x, received.x)
+    with pytest.raises(RecordingError, match='no send stamps'):
+        read_recording(DATA / 'sqlite3_none', time_source='sent')
+    with pytest.raises(RecordingError, match=r'header\.stamp\.sec'):
+        read_recording(path, time_source='header')
+    with pytest.raises(RecordingError, match='expected received, sent, header'):
+        read_recording(path, time_source='clock')
+
+
+def sent_earlier(content, nanoseconds):
+    """Change the send stamps of all messages in an uncompressed mcap file."""
+    position = len(MAGIC)
+    while position < len(content) - len(MAGIC):
+        kind, size = HEAD.unpack_from(content, position)
+        body = position + HEAD.size
+        if kind == CHUNK:
+            content[body + 24 : body + 28] = bytes(4)  # no checksum
+            position = body + 32 + struct.unpack_from('<I', content, body + 28)[0] + 8
+            continue
+        if kind == MESSAGE:
+            (sent,) = struct.unpack_from('<Q', content, body + 14)
+            struct.pack_into('<Q', content, body + 14, sent - nanoseconds)
+        position = body + size
+
+
+def test_the_stamp_in_a_header_can_be_the_time(truth):
+    topics = {
+        'u': '/valve/state/current[1]',
+        'p1': '/valve/state/pressure[0].bar*125-25',
+        'x': '/valve/state/current[2]*6.25-25',
+    }
+    found = read_recording(DATA / 'own_message.mcap.zstd', topics, time_source='header')
+    np.testing.assert_allclose(found.x, truth.x, atol=1e-4)

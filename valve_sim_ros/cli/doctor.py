@@ -3,22 +3,16 @@
 """`valve_sim doctor`: what recordings can tell and what to record next."""
 
 from pathlib import Path
+from typing import Any
 
 import click
 
-from .options import topic_option, topics_by_signal
+from .options import read, reading_options
 
 
 @click.command('doctor')
 @click.argument('data', nargs=-1, type=click.Path(path_type=Path))
-@topic_option
-@click.option(
-    '--msg-dir',
-    'folders',
-    multiple=True,
-    type=click.Path(path_type=Path),
-    help='Folder with .msg files, for bags that do not define their types; repeatable.',
-)
+@reading_options
 @click.option(
     '--signal', type=click.Path(path_type=Path), help='Write the recommended commands to this CSV.'
 )
@@ -33,16 +27,15 @@ from .options import topic_option, topics_by_signal
 )
 def doctor_command(
     data: tuple[Path, ...],
-    topics: tuple[str, ...],
-    folders: tuple[Path, ...],
     signal: Path | None,
     limits: tuple[float, float],
+    **reading: Any,
 ) -> None:
     """Say what DATA (bags or CSV files) can tell about the valve, before anything is fitted.
 
     Without DATA, --signal writes the commands with which to begin.
     """
-    from ..recordings import read_recording, write_recording
+    from ..recordings import write_recording
     from ..recordings.advice import recommended, wanted
     from ..recordings.doctor import examine, PARAMETERS, together
 
@@ -50,9 +43,9 @@ def doctor_command(
         raise click.UsageError('give a bag or CSV file, or --signal FILE')
     examinations = []
     for path in data:
-        recording = read_recording(path, topics_by_signal(topics), message_folders=folders)
+        recording = read(path, **reading)
         examinations.append(examine(recording))
-        click.echo(f'{path}:')
+        click.echo(f'{path} (time: {recording.provenance.time_source}):')
         for line in examinations[-1].lines():
             click.echo(f'  {line}')
     best = together(examinations) if examinations else ()

@@ -4,12 +4,13 @@
 
 from pathlib import Path
 import sys
+from typing import Any
 
 import click
 
 from ..identification.holdout import WAYS
 from ..recordings.recording import OUTPUTS
-from .options import progress_bar, topic_option, topics_by_signal
+from .options import progress_bar, read, reading_options
 
 INTERRUPTED = 130
 """Exit code of what Ctrl-C has ended."""
@@ -18,7 +19,7 @@ INTERRUPTED = 130
 @click.command('identify')
 @click.argument('data', nargs=-1, required=True, type=click.Path(path_type=Path))
 @click.option('--out', required=True, type=click.Path(path_type=Path), help='Folder for results.')
-@topic_option
+@reading_options
 @click.option(
     '--signal',
     'signals',
@@ -40,12 +41,12 @@ INTERRUPTED = 130
 def identify_command(
     data: tuple[Path, ...],
     out: Path,
-    topics: tuple[str, ...],
     signals: tuple[str, ...],
     seed: int,
     hold_out: str,
     profiles: bool,
     plot: bool,
+    **reading: Any,
 ) -> None:
     """Fit the valve to DATA (bags or CSV files); write fitted.yaml, identify.json, report.html.
 
@@ -53,10 +54,10 @@ def identify_command(
     """
     from ..identification.identify import identify
 
+    recordings = [read(path, **reading) for path in data]
     with progress_bar() as progress:
         result = identify(
-            data,
-            topics=topics_by_signal(topics),
+            recordings,
             seed=seed,
             signals=signals or None,
             hold_out=hold_out,

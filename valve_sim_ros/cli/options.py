@@ -4,10 +4,14 @@
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from typing import Any
+from pathlib import Path
+from typing import Any, TYPE_CHECKING
 
 import click
 from tqdm import tqdm
+
+if TYPE_CHECKING:
+    from ..recordings import Recording
 
 topic_option: Callable[[Any], Any] = click.option(
     '--topic',
@@ -16,6 +20,44 @@ topic_option: Callable[[Any], Any] = click.option(
     metavar='SIGNAL=TOPIC',
     help='Topic (or CSV column) of a signal, e.g. x=/valve_7/position; repeatable.',
 )
+
+_READING = (
+    click.option(
+        '--sample-time',
+        type=click.FloatRange(min=0.0, min_open=True),
+        help='Sampling period of the valve [s], if it was recorded less often than it samples.',
+    ),
+    click.option(
+        '--msg-dir',
+        'message_folders',
+        multiple=True,
+        type=click.Path(path_type=Path),
+        help='Folder with .msg files, for bags that do not define their types; repeatable.',
+    ),
+    click.option(
+        '--time',
+        'time_source',
+        type=click.Choice(['received', 'sent', 'header']),
+        default='received',
+        show_default=True,
+        help='Which stamps of a bag are the time of a message.',
+    ),
+    topic_option,
+)
+
+
+def reading_options(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Add the options of `read` to a verb."""
+    for option in _READING:
+        command = option(command)
+    return command
+
+
+def read(path: Path, topics: Sequence[str], **reading: Any) -> 'Recording':
+    """Read a bag or CSV file as the options say."""
+    from ..recordings import read_recording
+
+    return read_recording(path, topics_by_signal(topics), **reading)
 
 
 def topics_by_signal(topics: Sequence[str]) -> dict[str, str]:

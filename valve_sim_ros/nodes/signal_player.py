@@ -12,9 +12,11 @@ from rclpy.node import Node
 from std_msgs.msg import Float64
 
 from ..recordings import read_commands, RecordingError
-from .spinning import run
+from .messages import OUTPUT, publisher
+from .parameters import refuse_unknown
+from .spinning import ends_quietly, run
+from .start import signal_player
 
-QUEUE = 10
 SHORTEST_PERIOD = 0.001
 """Nothing is sent more often [s]."""
 
@@ -35,6 +37,7 @@ class SignalPlayer(Node):
             If there is no file, or it cannot be read.
         """
         super().__init__('signal_player', **options)
+        refuse_unknown(self, ['file'])
         words = ParameterDescriptor(description='CSV file (t,u) or bag to play', read_only=True)
         path = self.declare_parameter('file', '', words).value
         if not path:
@@ -46,13 +49,14 @@ class SignalPlayer(Node):
         self._times = np.round(commands.time * 1e9).astype(np.int64)
         self._u = commands.u
         self._next, self._start = 0, -1
-        self._publisher = self.create_publisher(Float64, 'u', QUEUE)
+        self._publisher = publisher(self, Float64, 'u', OUTPUT)
         step = float(np.median(np.diff(commands.time))) if len(commands) > 1 else 1.0
         self.create_timer(max(step, SHORTEST_PERIOD), self._tick)
         self.get_logger().info(
             f'{path}: {len(commands)} commands in {commands.time[-1]:.6g} s; waiting for a valve'
         )
 
+    @ends_quietly
     def _tick(self) -> None:
         """Send the command that is due; end behind the last one."""
         now = self.get_clock().now().nanoseconds
@@ -76,4 +80,4 @@ def main(args: Sequence[str] | None = None) -> None:
 
 
 if __name__ == '__main__':
-    main()
+    signal_player()

@@ -20,6 +20,7 @@ def read_recording(
     topics: Topics | None = None,
     sample_time: float | None = None,
     message_folders: Sequence[str | os.PathLike[str]] = (),
+    time_source: str = 'received',
 ) -> Recording:
     """Read a bag (folder, .mcap or .db3 file, compressed or not) or a CSV file.
 
@@ -33,6 +34,9 @@ def read_recording(
         Sampling period of the valve [s], for bags that hold only some of its samples.
     message_folders : sequence of path-like
         Folders with ``PACKAGE/msg/NAME.msg`` files, for old bags that do not define their types.
+    time_source : {'received', 'sent', 'header'}
+        Which stamps are the time of a message: when the recorder received it, when its publisher
+        sent it (mcap only), or the stamp in its header.
 
     Raises
     ------
@@ -44,7 +48,13 @@ def read_recording(
         raise RecordingError(f'{path}: no such bag or CSV file; check the path')
     if path.suffix.lower() == '.csv':
         return read_csv(path, topics)
-    return read_bag(path, topics, sample_time=sample_time, message_folders=message_folders)
+    return read_bag(
+        path,
+        topics,
+        sample_time=sample_time,
+        message_folders=message_folders,
+        time_source=time_source,
+    )
 
 
 def read_commands(path: str | os.PathLike[str], topics: Topics | None = None) -> Recording:

@@ -15,6 +15,7 @@ from rosbags.typesys import get_typestore, Stores
 
 from .align import align, Arrivals
 from .bag_files import Bag, opened, storage_files
+from .clocks import differences, stamps
 from .errors import RecordingError
 from .fields import Decoder, FLOAT64
 from .recording import Provenance, Recording, refuse_not_finite
@@ -32,6 +33,7 @@ def read_bag(
     require_outputs: bool = True,
     sample_time: float | None = None,
     message_folders: Sequence[str | os.PathLike[str]] = (),
+    time_source: str = 'received',
 ) -> Recording:
     """Read the signals of one valve from a bag and put them on one time axis.
 
@@ -48,6 +50,8 @@ def read_bag(
         Sampling period of the valve [s], where the outputs were recorded less often.
     message_folders : sequence of path-like
         Folders with .msg files, for bags that do not define their types.
+    time_source : {'received', 'sent', 'header'}
+        Which stamps are the time of a message.
 
     Raises
     ------
@@ -68,7 +72,9 @@ def read_bag(
                 (c.definition for c in bag.connections.values() if c.definition.language),
                 [Path(folder) for folder in message_folders],
             )
-            return _read(path, files, bag, decoder, topics, require_outputs, sample_time)
+            return _read(
+                path, files, bag, decoder, topics, require_outputs, sample_time, time_source
+            )
         except RecordingError as error:
             raise RecordingError(f'{path}: {error}') from None
 
@@ -81,6 +87,7 @@ def _read(
     topics: Topics | None,
     require_outputs: bool,
     sample_time: float | None,
+    time_source: str,
 ) -> Recording:
     """Read an open bag."""
     counts, connections = bag.counts, bag.connections
@@ -98,7 +105,7 @@ def _read(
     provenance = Provenance(
         paths=(str(path),),
         digests={str(file): digest(file) for file in files},
-        time_source='received',
+        time_source=time_source,
         storage='mcap' if '.mcap' in files[0].name else 'sqlite3',
         reader='valve_sim_ros',
     )
@@ -112,7 +119,8 @@ def _read(
         return from_samples(*rows, columns[sampled].packed_stamps, sampled, provenance, notes)
     selections = select(topics, counts, require_outputs)
     columns, notes = bag.read({chosen.topic for chosen in selections.values()})
-    arrivals = _arrivals(selections, columns, connections, decoder)
+    arrivals = _arrivals(selections, columns, connections, decoder, time_source)
+    notes += differences(columns)
     commands_only = not require_outputs and len(selections) == 1
     messages = max(
         (each.stamps.size for name, each in arrivals.items() if name != 'u' or commands_only),
@@ -133,6 +141,7 @@ def _arrivals(
     columns: Mapping[str, Column],
     connections: Mapping[str, Connection],
     decoder: Decoder,
+    time_source: str,
 ) -> dict[str, Arrivals]:
     """Decode each topic once and return stamps and values by signal."""
     arrivals = {}
@@ -144,15 +153,14 @@ def _arrivals(
                 f'topic {topic} is encoded as {connection.encoding!r}, not as ROS 2 messages '
                 f'({CDR}): convert the recording first'
             )
-        stamps = np.array(column.packed_stamps, dtype=np.int64)
+        kind = connection.definition.msgtype
+        times = stamps(column, time_source, decoder, kind, topic)
         fields = [selections[name].field for name in names]
-        decoded = decoder.values(column, connection.definition.msgtype, fields, topic)
+        decoded = decoder.values(column, kind, fields, topic)
         for name, raw in zip(names, decoded, strict=True):
             values = selections[name].scale * raw + selections[name].offset
-            refuse_not_finite(
-                name, values, 1e-9 * np.asarray(stamps - stamps[:1], dtype=np.float64)
-            )
-            arrivals[name] = Arrivals(stamps, values)
+            refuse_not_finite(name, values, 1e-9 * np.asarray(times - times[:1], dtype=np.float64))
+            arrivals[name] = Arrivals(times, values)
     return {name: arrivals[name] for name in selections if arrivals[name].stamps.size}
 
 

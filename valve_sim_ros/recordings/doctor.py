@@ -74,7 +74,7 @@ class Examination:
     def _what_happened(self) -> list[str]:
         """Return range and noise by signal, and what u, p2 and the stem did."""
         lines = [
-            f'{name}: from {each.low:.4g} to {each.high:.4g} %, noise {each.noise:.2g} %'
+            f'{name}: from {each.low:.4g} to {each.high:.4g} %, noise at most {each.noise:.2g} %'
             for name, each in self.signals.items()
             if name != 'u'
         ]

@@ -37,7 +37,8 @@ class Span:
     low, high : float
         Range [% of span].
     noise : float
-        Standard deviation of its noise [% of span], at least what its resolution brings.
+        Standard deviation of its noise [% of span], at least what its resolution brings; too
+        high where the signal itself bends at every sample.
     resolution : float
         Smallest step between two values [% of span]; NaN for a constant.
     clipped : float

@@ -23,7 +23,7 @@ from .storage import BLOCK, Column, Connection, Definition, LANGUAGES, zstd
 MAGIC = b'\x89MCAP0\r\n'
 FOOTER, SCHEMA, CHANNEL, MESSAGE, CHUNK, STATISTICS, SUMMARY_OFFSET = 2, 3, 4, 5, 6, 11, 14
 HEAD = struct.Struct('<BQ')
-MESSAGE_HEAD = struct.Struct('<HIQQ')
+MESSAGE_HEAD = struct.Struct('<HIqq')
 CHUNK_HEAD = struct.Struct('<QQQI')
 FOOTER_BYTES = HEAD.size + 20 + len(MAGIC)
 
@@ -127,7 +127,7 @@ class McapFile:
     ) -> None:
         """Append the messages among some records to their columns, or count them."""
         sinks = {
-            channel: (column.stamps.append, column.payloads.append)
+            channel: (column.stamps.append, column.sent.append, column.payloads.append)
             for channel, column in columns.items()
         }
         head, message = HEAD.unpack_from, MESSAGE_HEAD.unpack_from
@@ -138,10 +138,11 @@ class McapFile:
             if following > end:
                 break
             if kind == MESSAGE:
-                channel, _, stamp, _ = message(data, position + HEAD.size)
+                channel, _, stamp, sent = message(data, position + HEAD.size)
                 if channel in sinks:
-                    add_stamp, add_payload = sinks[channel]
+                    add_stamp, add_sent, add_payload = sinks[channel]
                     add_stamp(stamp)
+                    add_sent(sent)
                     add_payload(data[position + HEAD.size + MESSAGE_HEAD.size : following])
                 elif tally is not None:
                     tally[channel] += 1

@@ -213,6 +213,8 @@ class Quality:
 
 def milliseconds(seconds: float) -> str:
     """Return a short time in words."""
+    if abs(seconds) >= 1.0:
+        return f'{seconds:.4g} s'
     return f'{round(1e3 * seconds, 3) + 0.0:.3g} ms'
 
 

@@ -48,12 +48,14 @@ class Column:
     """The messages of one topic in the order in which they were stored.
 
     Payloads are packed into one buffer block by block: a million small objects would take ten
-    times the memory of what they hold.
+    times the memory of what they hold. `sent` stays empty where the storage has no such stamps.
     """
 
     stamps: list[int] = field(default_factory=list)
+    sent: list[int] = field(default_factory=list)
     payloads: list[bytes] = field(default_factory=list)
     packed_stamps: 'array[int]' = field(default_factory=lambda: array('q'))
+    packed_sent: 'array[int]' = field(default_factory=lambda: array('q'))
     packed: bytearray = field(default_factory=bytearray)
     sizes: 'array[int]' = field(default_factory=lambda: array('L'))
 
@@ -62,9 +64,11 @@ class Column:
         if self.payloads and self.payloads[0][:4] == ZSTD_MAGIC:  # all of a file are, or none
             self.payloads = [zstd.decompress(payload) for payload in self.payloads]
         self.packed_stamps.extend(self.stamps)
+        self.packed_sent.extend(self.sent)
         self.packed += b''.join(self.payloads)
         self.sizes.extend(map(len, self.payloads))
         self.stamps.clear()
+        self.sent.clear()
         self.payloads.clear()
 
     def truncate(self, count: int) -> None:

@@ -186,7 +186,7 @@ class Facts:
             if each.high - each.low < 10.0 * each.noise:
                 found.append(f'{name} hardly leaves its noise: dead sensor, or wrong topic?')
             elif each.noise > MUCH_NOISE:
-                found.append(f'{name} is noisy ({each.noise:.2g} %)')
+                found.append(f'{name} is noisy, or faster than the samples ({each.noise:.2g} %)')
             if each.clipped > 0.0:
                 found.append(
                     f'{name} is clipped for {100 * each.clipped:.2g} % of the time: its sensor '
