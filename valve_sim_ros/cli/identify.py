@@ -8,6 +8,7 @@ import sys
 import click
 
 from ..identification.holdout import WAYS
+from ..model.spec import BASE_MODEL
 from ..recordings.recording import OUTPUTS
 from .options import progress_bar, topic_option, topics_by_signal
 
@@ -26,6 +27,9 @@ INTERRUPTED = 130
     type=click.Choice(OUTPUTS),
     help='Output to fit; repeatable; all that are measured by default.',
 )
+@click.option(
+    '--model', default=BASE_MODEL, show_default=True, help='Valve model: base or a rival, as kano.'
+)
 @click.option('--seed', default=0, show_default=True, help='Seed of the global search.')
 @click.option(
     '--hold-out',
@@ -42,6 +46,7 @@ def identify_command(
     out: Path,
     topics: tuple[str, ...],
     signals: tuple[str, ...],
+    model: str,
     seed: int,
     hold_out: str,
     profiles: bool,
@@ -59,6 +64,7 @@ def identify_command(
             topics=topics_by_signal(topics),
             seed=seed,
             signals=signals or None,
+            model=model,
             hold_out=hold_out,
             profiles=profiles,
             progress=progress,

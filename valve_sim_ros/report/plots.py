@@ -45,9 +45,11 @@ def overlay(result: Identification, number: int = 0) -> Figure:
     recording, fitted = result.recordings[number], result.fitted[number]
     thin = _thin(recording.time.size)
     time = recording.time[thin]
-    figure = Figure(figsize=(WIDTH, 8.4), layout='constrained')
-    rows = figure.subplots(4, 1, sharex=True)
-    for axes, (name, label) in zip(rows, LABELS.items(), strict=True):
+    # data-driven models know no pressures
+    labels = {name: label for name, label in LABELS.items() if name in ('u', *fitted)}
+    figure = Figure(figsize=(WIDTH, 2.1 * len(labels)), layout='constrained')
+    rows = figure.subplots(len(labels), 1, sharex=True)
+    for axes, (name, label) in zip(rows, labels.items(), strict=True):
         if name == 'u':
             axes.step(time, recording.u[thin], where='post', color=COMMAND, label='command')
         else:

@@ -40,5 +40,6 @@ MODEL = Rival(
     channel='p2',
     from_friction=levels,
     held=('a_1', 'v_s'),
+    work=4.0,
     confirmed='the law, by public documentation of friction blocks and eq. (8)',
 )

@@ -47,6 +47,8 @@ class Rival:
         Parameters that no recording at these rates identifies, or switches: a fit keeps them.
     confirmed, reconstructed : str
         What a source states or code confirms; what had to be reconstructed.
+    work : float
+        Time that a sample takes, relative to He's model: a search tries fewer candidates.
     remark : str
         What a user has to know, e.g. an input that the model cannot answer.
     presets : mapping of str to mapping
@@ -64,6 +66,7 @@ class Rival:
     held: tuple[str, ...] = ()
     confirmed: str = ''
     reconstructed: str = ''
+    work: float = 1.0
     remark: str = ''
     presets: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
 

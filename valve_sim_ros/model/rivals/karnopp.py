@@ -66,6 +66,7 @@ MODEL = Rival(
     channel='p2',
     from_friction=levels,
     held=('a_1', 'delta', 'v_s'),
+    work=4.0,
     confirmed='the law, by a public code and public documentation; Table 1 by the paper',
     reconstructed='the corrected viscous coefficient; the Stribeck speed',
     presets={'table_1': {}, 'corrected': {'a_2': VISCOUS_CORRECTED / MASS}},

@@ -114,6 +114,7 @@ MODEL = Rival(
     channel='p2',
     from_friction=levels,
     held=('a_1', 'sigma_0', 'sigma_1', 'v_s'),
+    work=100.0,
     confirmed='the law and its published constants, by public codes and libraries',
     remark='creeps under a load that oscillates below f_s',
 )
