@@ -22,8 +22,13 @@ SLACK = 1.5
 """Candidates worse than the best by more than this factor are given up on the way."""
 FINEST = 2e-4
 """Grids narrow down to this step [% of span]."""
+WIDTH = 3
+"""Points to each side of the centre of a grid; the next grid is finer by as much."""
 SAME = 1e-9
 """Relative difference of cost that does not count."""
+SCANS = ((1.0, 0.0), (1.0, 1.0), (0.0, 1.0), (1.0, 0.0))
+"""Lines along which a coarse optimum is looked for again: the moment of a jump is sensitive to
+f_s - f_d (a ramp) or f_s + f_d (a reversal), its level to f_d."""
 SIMPLEX = (1.0, 1.0, 0.3)
 """First step of the descent in f_s, f_d [% of span] and ln a_2."""
 
@@ -106,10 +111,10 @@ def narrow(
     starts: Array,
     steps: Array,
     keep: int,
-    width: int,
+    fine: int,
     progress: Callable[[float], None],
 ) -> Array:
-    """Return the best point found from a grid of starts.
+    """Return the best point found from a grid of starts, by scans along lines and finer grids.
 
     Parameters
     ----------
@@ -119,24 +124,31 @@ def narrow(
         The coarse grid.
     steps : ndarray, shape (d,)
         Its steps.
-    keep, width : int
-        How many of the best go on to the next grid, and how many points that has to each side.
+    keep, fine : int
+        How many of the best go on to the next scan or grid, and how many points a scan has.
     progress : callable
         Called with the share done.
     """
     seen = legal(starts)
     costs = candidates.costs(seen)
-    levels = max(int(np.ceil(np.log(steps[0] / FINEST) / np.log(width))), 1)
-    offsets = np.stack(
-        np.meshgrid(*[np.arange(-width, width + 1) / width] * starts.shape[1]), axis=-1
-    ).reshape(-1, starts.shape[1])
+    levels = max(int(np.ceil(np.log(steps[0] / FINEST) / np.log(WIDTH))), 1)
+    for number, direction in enumerate(SCANS):
+        centres = _best(seen, costs, steps, keep)
+        reach = seen[:, 0].max() if number == 0 else 3.0 * steps[0]
+        line = np.linspace(-reach, reach, fine)[:, None] * np.array(direction)
+        seen = legal(np.concatenate([centres, *(centre + line for centre in centres)]))
+        costs = candidates.costs(seen)
+        progress(0.5 * (number + 1) / len(SCANS))
+    steps = np.full(2, 0.3 * steps[0])
+    square = np.arange(-WIDTH, WIDTH + 1) / WIDTH
+    offsets = np.stack(np.meshgrid(square, square), axis=-1).reshape(-1, 2)
     for level in range(levels):
         centres = _best(seen, costs, steps, keep if level < 3 else 1)
         around = np.concatenate([centre + offsets * steps for centre in centres])
         around = legal(np.concatenate([centres, around]))
         seen, costs = around, candidates.costs(around)
-        steps = steps / width
-        progress((level + 1) / levels)
+        steps = steps / WIDTH
+        progress(0.5 + 0.5 * (level + 1) / levels)
     return _leftmost(candidates, _best(seen, costs, steps, 1)[0])
 
 
@@ -190,7 +202,7 @@ def _best(points: Array, costs: Array, steps: Array, keep: int) -> Array:
 
 
 def _leftmost(candidates: Candidates, point: Array) -> Array:
-    """Return the point with the smallest f_s that gives the same cost: without a jump if it can."""
+    """Return the point with the smallest f_s of the same cost: without a jump if it can."""
     low, high = point.copy(), point.copy()
     low[0] = abs(point[1])
     best = float(candidates.costs(point[None], ALL)[0])

@@ -171,7 +171,8 @@ def _search(
     """Return the best point."""
     if candidates.model.data_driven:
         starts, step = _friction_grid(candidates)
-        return narrow(candidates, starts, np.full(2, step), 6, 3, progress)
+        fine = int(np.clip(EFFORT / (6 * sum(run.x.size for run in candidates.runs)), 300, 2000))
+        return narrow(candidates, starts, np.full(2, step), 6, fine, progress)
     assert base is not None
     starts = _stem_starts(candidates, base)
     slow = candidates.model.work > SLOW
@@ -190,7 +191,9 @@ def _friction_grid(candidates: Candidates) -> tuple[Array, float]:
     inputs = np.concatenate([run.inputs for run in candidates.runs])
     reach, samples = float(np.ptp(inputs)), inputs.size
     # a valve that starts far from its command needs more than the command's range
-    reach = max(reach, *(float(np.abs(run.inputs - run.origin[2]).max()) for run in candidates.runs))
+    reach = max(
+        reach, *(float(np.abs(run.inputs - run.origin[2]).max()) for run in candidates.runs)
+    )
     count = int(np.clip(np.sqrt(1.25 * EFFORT / samples), FEWEST, MOST))
     step = min(1.1 * reach, 60.0) / count
     f_s = step * np.arange(count + 1)
