@@ -11,6 +11,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 from scipy.optimize import minimize
 
 from ..model.pipeline import Array
@@ -155,24 +156,28 @@ def narrow(
 def descend(
     candidates: Candidates,
     starts: Array,
-    keep: int,
+    most: int,
     evaluations: int,
     progress: Callable[[float], None],
 ) -> Array:
-    """Return the best point that Nelder-Mead's simplices find from the `keep` best starts.
+    """Return the best point that Nelder-Mead's simplices find.
 
-    Parameters and result are otherwise those of `narrow`; `evaluations` limits each descent.
+    They go down from the best start of each stem speed (third coordinate), `most` of them at
+    most, and take up to `evaluations` each; other parameters and result are those of `narrow`.
     """
     starts = legal(starts)
-    best, least = starts[0], np.inf
-    chosen = _best(starts, candidates.costs(starts), np.array(SIMPLEX), keep)
-    for number, start in enumerate(chosen):
+    costs = candidates.costs(starts, 100.0 * SLACK)
+    speeds = np.unique(starts[:, 2])
+    bests = [np.flatnonzero(starts[:, 2] == speed) for speed in speeds]
+    chosen = sorted((each[np.argmin(costs[each])] for each in bests), key=lambda i: costs[i])
+    best, least = starts[chosen[0]], np.inf
+    for number, index in enumerate(chosen[:most]):
         found = minimize(
             lambda point: float(candidates.costs(legal(point[None]), ALL)[0]),
-            start,
+            starts[index],
             method='Nelder-Mead',
             options={
-                'initial_simplex': np.vstack([start, start + np.diag(SIMPLEX)]),
+                'initial_simplex': np.vstack([starts[index], starts[index] + np.diag(SIMPLEX)]),
                 'maxfev': evaluations,
                 'xatol': 1e-3,
                 'fatol': 1e-6,
@@ -180,11 +185,11 @@ def descend(
         )
         if found.fun < least:
             best, least = legal(found.x[None])[0], found.fun
-        progress((number + 1) / len(chosen))
+        progress((number + 1) / min(most, len(chosen)))
     return best
 
 
-def ordered(points: Array, costs: Array) -> Array:
+def ordered(points: Array, costs: Array) -> npt.NDArray[np.intp]:
     """Return the order from the best: equal costs by the smaller f_s, then the smaller jump."""
     scale = SAME * (1.0 + float(np.min(costs)))
     return np.lexsort((points[:, 0] - points[:, 1], points[:, 0], np.round(costs / scale)))

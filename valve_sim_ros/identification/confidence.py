@@ -36,12 +36,13 @@ def estimates_of(
         if name in searched:
             low, high = float(values[name].min()), float(values[name].max())
             half = max(value - low, high - value)
-            estimates[name] = Estimate(value, half, _verdict(parameter.unit, value, low, high))
+            words = _verdict(parameter.unit, value, low, high)
+            estimates[name] = Estimate(value, half, words, low, high, unit=parameter.unit)
         elif base is not None and name in base.estimates and name not in candidates.model.held:
             estimates[name] = base.estimates[name]
         else:
             words = 'held at its default: data of this kind cannot tell it'
-            estimates[name] = Estimate(value, float('inf'), words)
+            estimates[name] = Estimate(value, float('inf'), words, unit=parameter.unit)
     return estimates
 
 

@@ -2,9 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """From recordings to a fitted rival model, with the same result as for the base valve."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -14,19 +13,17 @@ from ..model.rivals import RIVALS
 from ..model.rivals.declaration import Channel, Rival
 from ..model.spec import ValveSpec
 from ..recordings.recording import Recording
-from .candidates import Candidates, descend, narrow, Run
+from .candidates import Candidates, descend, narrow, Run, SCANS
 from .confidence import estimates_of
 from .errors import IdentificationError
 from .fitness import fitness
+from .holdout import THIRDS
 from .result import Identification
+from .watch import Progress
 
-if TYPE_CHECKING:
-    Progress = Callable[[float, str], None]
-
-THIRDS = {'first third': (0.0, 1.0 / 3.0), 'last third': (2.0 / 3.0, 1.0)}
 FRONT = ('f_d1', 'T_g1', 'T_g2')
 """What a physical model takes over from the base valve: its first two stages."""
-EFFORT = 4e7
+EFFORT = 2e7
 """Samples times candidates on the coarse grid, for He's model."""
 FEWEST, MOST = 40, 120
 """Steps of f_s on the coarse grid of a data-driven model."""
@@ -45,7 +42,7 @@ def identify_rival(
     base: Identification | None = None,
     channel: Channel = 'u',
     hold_out: bool = True,
-    progress: 'Progress | None' = None,
+    progress: Progress | None = None,
 ) -> Identification:
     """Fit a rival model by maximising eta of x, eq. (11).
 
@@ -136,7 +133,7 @@ def _candidates(
 
 
 def _run(
-    recording: Recording, part: slice, channel: Channel, start: dict[str, Array] | None
+    recording: Recording, part: slice, channel: Channel, start: Mapping[str, Array] | None
 ) -> Run:
     """Return one segment, started as the base fit starts it or at the first input."""
     x = recording.output('x')[part]
@@ -171,18 +168,23 @@ def _search(
     """Return the best point."""
     if candidates.model.data_driven:
         starts, step = _friction_grid(candidates)
-        fine = int(np.clip(EFFORT / (6 * sum(run.x.size for run in candidates.runs)), 300, 2000))
-        return narrow(candidates, starts, np.full(2, step), 6, fine, progress)
+        return narrow(candidates, starts, np.full(2, step), 6, _fine(candidates, 6), progress)
     assert base is not None
     starts = _stem_starts(candidates, base)
     slow = candidates.model.work > SLOW
-    return descend(candidates, starts, 1 if slow else 4, 60 if slow else 160, progress)
+    return descend(candidates, starts, 1 if slow else 5, 60 if slow else 160, progress)
+
+
+def _fine(candidates: Candidates, lines: int) -> int:
+    """Return how many points a scan gets if as many `lines` are scanned at once."""
+    samples = sum(run.x.size for run in candidates.runs)
+    return int(np.clip(EFFORT / (len(SCANS) * lines * samples), 100, 2000))
 
 
 def _again(rest: Candidates, point: Array) -> Array:
-    """Return the best point on part of the data: a descent from the whole, or a new search."""
+    """Return the best point on part of the data, starting where the whole data led."""
     if rest.model.data_driven:
-        return _search(rest, None)
+        return narrow(rest, point[None], np.full(2, 1.0), 2, _fine(rest, 6), lambda share: None)
     return descend(rest, point[None], 1, 40, lambda share: None)
 
 
@@ -223,7 +225,9 @@ def _withheld(runs: Sequence[Run], start: float, stop: float) -> list[Run]:
     total, first, rest = sum(run.x.size for run in runs), 0, []
     for run in runs:
         place = (first + np.arange(run.x.size)) / total
-        rest.append(replace(run, counts=run.counts & ((place < start) | (place >= stop))))
+        rest.append(
+            replace(run, counts=np.logical_and(run.counts, (place < start) | (place >= stop)))
+        )
         first += run.x.size
     return rest
 
@@ -235,7 +239,9 @@ def _outputs(candidates: Candidates, point: Array) -> list[Array]:
     theta, outputs = model.theta(values), []
     for run in candidates.runs:
         result = np.empty((3, run.x.size))
-        state = model.start(*map(float, run.origin), theta)
+        state = model.start(
+            float(run.origin[0]), float(run.origin[1]), float(run.origin[2]), theta
+        )
         dt = run.dt if run.dt.size > 1 else np.array([SAMPLE_TIME.default])
         model.make(candidates.channel).run(run.inputs, dt, state, theta, np.inf, (), (), result)
         outputs.append(result)
@@ -254,7 +260,7 @@ def _eta_inside_outside(
     """Return eta on the data that was fitted and on that which was withheld."""
     outputs = _outputs(rest, point)
     withheld = [
-        replace(run, counts=run.counts & ~used.counts)
+        replace(run, counts=np.logical_and(run.counts, np.logical_not(used.counts)))
         for run, used in zip(candidates.runs, rest.runs, strict=True)
     ]
     return {
