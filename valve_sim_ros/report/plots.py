@@ -26,9 +26,14 @@ MOST_POINTS = 20_000
 
 def draw_fit(result: Identification, path: str | os.PathLike[str]) -> None:
     """Write `overlay` of the first recording as PNG, aside first and then renamed."""
+    save(overlay(result), path)
+
+
+def save(figure: Figure, path: str | os.PathLike[str]) -> None:
+    """Write a figure as PNG, aside first and then renamed."""
     path = Path(path)
     aside = path.with_name(f'.{path.stem}.part.png')
-    overlay(result).savefig(aside, dpi=110)
+    figure.savefig(aside, dpi=110)
     os.replace(aside, path)
 
 
