@@ -197,12 +197,12 @@ def ordered(points: Array, costs: Array) -> npt.NDArray[np.intp]:
 
 def _best(points: Array, costs: Array, steps: Array, keep: int) -> Array:
     """Return the best points that are not neighbours of a better one."""
+    ranked = points[ordered(points, costs)]
+    ranked = ranked[: np.count_nonzero(np.isfinite(costs))]
     chosen: list[Array] = []
-    for index in ordered(points, costs):
-        if len(chosen) == keep or not np.isfinite(costs[index]):
-            break
-        if all((np.abs(points[index] - other) > 1.5 * steps).any() for other in chosen):
-            chosen.append(points[index])
+    while len(chosen) < keep and len(ranked):
+        chosen.append(ranked[0])
+        ranked = ranked[(np.abs(ranked - ranked[0]) > 1.5 * steps).any(axis=1)]
     return np.array(chosen)
 
 
