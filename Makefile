@@ -38,7 +38,7 @@ unexport NUMBA_DISABLE_JIT
 ISOLATED = logs=$$(mktemp -d) && trap 'rm -rf "$$logs"' EXIT && export ROS_LOG_DIR=$$logs \
 	ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST ROS_DOMAIN_ID=$$(( $$$$ % 101 + 1 )) &&
 
-.PHONY: help demo test lint format bench blind blind-tuning starts coverage lower-bounds colcon
+.PHONY: help demo test lint format bench paper blind blind-tuning starts coverage lower-bounds colcon
 .PHONY: lock clean check-python
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
@@ -67,6 +67,9 @@ bench: $(VENV)/.ready  ## speed of the model and of the identification
 	@set -e; for script in benchmarks/[a-z]*.py; do \
 	  test -e "$$script" || { echo 'make bench: no benchmarks/*.py yet' >&2; exit 1; }; \
 	  echo "$$script"; $(ISOLATED) $(BIN)/python "$$script"; done
+
+paper: $(VENV)/.ready  ## the paper's experiments and comparison again; page in out/paper, table in doc/paper.md
+	@$(BIN)/python studies/paper.py --doc doc/paper.md
 
 blind: $(VENV)/.ready  ## diagnose hidden effects on blind records (hours); table in doc/blind.md
 	@$(BIN)/python -m blind study --split test --doc doc/blind.md $(BLIND_ARGS)

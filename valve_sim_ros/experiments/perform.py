@@ -42,7 +42,7 @@ def perform(
     spec = spec or ValveSpec()
     if experiment.closed_loop:
         loop = closed_loop(experiment.commands(), experiment.sample_time, spec)
-        t = experiment.sample_time * np.arange(loop.u.size)
+        t: Array = np.arange(loop.u.size, dtype=np.float64) * experiment.sample_time
         result = Simulation(t, *loop, spec)
     else:
         result = simulate(experiment.commands(), experiment.sample_time, spec)

@@ -33,6 +33,7 @@ def compare(
     models: Sequence[str] = tuple(RIVALS),
     seed: int = 0,
     channel: Channel = 'u',
+    hold_out: bool = True,
     progress: Progress | None = None,
 ) -> Comparison:
     """Fit the base valve and rivals to x of the same recordings.
@@ -47,6 +48,8 @@ def compare(
         Seed of the base valve's search.
     channel : {'u', 'p2'}
         What drives the rivals: the command, or the measured p2 in the place of the force.
+    hold_out : bool
+        Also fit without the outer thirds; takes three times as long.
     progress : callable, optional
         Called with the share done, 0 to 1, and what is being done; from several threads.
 
@@ -68,7 +71,11 @@ def compare(
             )
     share = _shares([BASE_MODEL, *models], progress)
     base_fit = partial(
-        identify, recordings, seed=seed, hold_out='time', progress=share(BASE_MODEL)
+        identify,
+        recordings,
+        seed=seed,
+        hold_out='time' if hold_out else 'none',
+        progress=share(BASE_MODEL),
     )
     with ThreadPoolExecutor(WORKERS) as pool:
         base = pool.submit(_timed, base_fit)
@@ -82,6 +89,7 @@ def compare(
                     recordings,
                     base=needed,
                     channel=channel,
+                    hold_out=hold_out,
                     progress=share(name),
                 )
             )
