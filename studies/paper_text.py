@@ -152,7 +152,7 @@ def markdown(blocks):
     lines = [
         f'# {TITLE}',
         '',
-        'Written by `make paper`; nothing is tuned. ' + EXPERIMENT_NAMES,
+        f'Written by `make paper`; nothing is tuned. {NAMES}',
         '',
     ]
     for heading, text, head, rows in blocks:
