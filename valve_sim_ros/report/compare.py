@@ -21,8 +21,10 @@ from .plots import FITTED, MEASURED, save
 COLUMNS = 3
 LEG = 800
 """Samples from one end of the span to the other, for a signature."""
-SLOW = 25.0
-"""Length of such a leg in time constants of the chamber."""
+SLOW = 50.0
+"""Length of such a leg in time constants of the chamber,"""
+LONGEST_LAG = 300.0
+"""of which longer ones count as this [s]."""
 MOST_POINTS = 3000
 
 
@@ -71,7 +73,7 @@ def signatures(comparison: Comparison) -> Figure:
 def signature(spec: ValveSpec) -> tuple[Array, Array]:
     """Return u and x of a closed loop from 0 to 100 % and back, slow against the chamber."""
     lag = max(spec.values.get('T_g1', 1.0), spec.values.get('T_g2', 1.0))
-    sample_time = min(max(SLOW * lag / LEG, 1e-3), 60.0)
+    sample_time = max(SLOW * min(lag, LONGEST_LAG) / LEG, 1e-3)
     up = np.linspace(0.0, 100.0, LEG)
     u = np.concatenate([up, up[::-1], up, up[::-1]])
     x = simulate(u, sample_time, spec).x
@@ -131,4 +133,6 @@ def _grid(entries: Sequence[Entry], **shared: Any) -> tuple[Figure, list[Any]]:
         axes.tick_params(labelsize=8)
     for axes in panels[len(entries) :]:
         axes.set_visible(False)
+    for axes in panels[max(len(entries) - COLUMNS, 0) : len(entries)]:
+        axes.tick_params(labelbottom=True)
     return figure, list(panels)
