@@ -39,8 +39,8 @@ unexport NUMBA_DISABLE_JIT
 ISOLATED = logs=$$(mktemp -d) && trap 'rm -rf "$$logs"' EXIT && export ROS_LOG_DIR=$$logs \
 	ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST ROS_DOMAIN_ID=$$(( $$$$ % 101 + 1 )) &&
 
-.PHONY: help demo test lint format bench blind blind-tuning starts coverage ragged lower-bounds
-.PHONY: colcon lock clean check-python
+.PHONY: help demo test lint format bench paper blind blind-tuning starts coverage ragged
+.PHONY: lower-bounds colcon lock clean check-python
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
 
@@ -68,6 +68,9 @@ bench: $(VENV)/.ready  ## speed of the model and of the identification
 	@set -e; for script in benchmarks/[a-z]*.py; do \
 	  test -e "$$script" || { echo 'make bench: no benchmarks/*.py yet' >&2; exit 1; }; \
 	  echo "$$script"; $(ISOLATED) $(BIN)/python "$$script"; done
+
+paper: $(VENV)/.ready  ## the paper's experiments and comparison again; page in out/paper, table in doc/paper.md
+	@$(BIN)/python studies/paper.py --doc doc/paper.md
 
 blind: $(VENV)/.ready  ## diagnose hidden effects on blind records (hours); table in doc/blind.md
 	@$(BIN)/python -m blind study --split test --doc doc/blind.md $(BLIND_ARGS)

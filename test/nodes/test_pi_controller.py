@@ -10,8 +10,8 @@ import pytest
 from rclpy.node import Node
 from std_msgs.msg import Float64
 
-from valve_sim_ros import ModelError, Valve
-from valve_sim_ros.experiments.pi_controller import PiController
+from valve_sim_ros import ModelError, ValveSpec
+from valve_sim_ros.experiments.perform import closed_loop
 from valve_sim_ros.nodes.messages import LOSSLESS, LOSSLESS_LATCHED
 from valve_sim_ros.nodes.pi_controller import PiControllerNode
 
@@ -22,26 +22,16 @@ def controller(**parameters):
     return PiControllerNode(parameter_overrides=overrides(**parameters))
 
 
-def offline(setpoints, hold, count, sample_time):
-    """Return u and x of the same loop without ROS."""
-    law, valve, x, rows = PiController(sample_time=sample_time), Valve(background=False), 0.0, []
-    for k in range(count):
-        u = law.step(setpoints[min(k // hold, len(setpoints) - 1)], x)
-        _, _, x = valve.step(u, sample_time)
-        rows.append((u, x))
-    return np.array(rows).T
-
-
 def test_closed_loop_over_dds_equals_the_loop_without_ros(lockstep_valve):
     valve = lockstep_valve(sample_time=0.2)
     node = controller(
         lockstep=True, sample_time=0.2, setpoints=[40.0, 60.0, 30.0], setpoint_hold=100.0
     )
     result = valve.drive(node, samples=1500, first_command=math.nan)
-    u, x = offline([40.0, 60.0, 30.0], 500, 1500, 0.2)
-    assert result.u.tolist() == u.tolist()
-    assert result.x.tolist() == x.tolist()
-    assert x.max() > 25.0  # it did move
+    loop = closed_loop(np.repeat([40.0, 60.0, 30.0], 500), 0.2, ValveSpec())
+    assert result.u.tolist() == loop.u.tolist()
+    assert result.x.tolist() == loop.x.tolist()
+    assert loop.x.max() > 25.0  # it did move
 
 
 def test_closed_loop_on_the_wall(bench):

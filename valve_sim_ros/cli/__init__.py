@@ -5,8 +5,10 @@
 import click
 
 from .. import __version__
+from .compare import compare_command
 from .diagnose import diagnose_command
 from .doctor import doctor_command
+from .experiment import experiment_command
 from .identify import identify_command
 from .simulate import simulate_command
 
@@ -28,7 +30,9 @@ def main() -> None:
     """Simulate a pneumatic control valve, or fit one to a recording."""
 
 
+main.add_command(compare_command)
 main.add_command(diagnose_command)
 main.add_command(doctor_command)
+main.add_command(experiment_command)
 main.add_command(identify_command)
 main.add_command(simulate_command)

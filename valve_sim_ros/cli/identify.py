@@ -9,6 +9,7 @@ from typing import Any
 import click
 
 from ..identification.holdout import WAYS
+from ..model.spec import BASE_MODEL
 from ..recordings.recording import OUTPUTS
 from .options import progress_bar, read, reading_options
 
@@ -27,6 +28,9 @@ INTERRUPTED = 130
     type=click.Choice(OUTPUTS),
     help='Output to fit; repeatable; all that are measured by default.',
 )
+@click.option(
+    '--model', default=BASE_MODEL, show_default=True, help='Valve model: base or a rival, as kano.'
+)
 @click.option('--seed', default=0, show_default=True, help='Seed of the global search.')
 @click.option(
     '--hold-out',
@@ -42,6 +46,7 @@ def identify_command(
     data: tuple[Path, ...],
     out: Path,
     signals: tuple[str, ...],
+    model: str,
     seed: int,
     hold_out: str,
     profiles: bool,
@@ -60,6 +65,7 @@ def identify_command(
             recordings,
             seed=seed,
             signals=signals or None,
+            model=model,
             hold_out=hold_out,
             profiles=profiles,
             progress=progress,

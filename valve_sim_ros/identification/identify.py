@@ -9,6 +9,8 @@ import numpy as np
 
 from ..model.parameters import BRANCH
 from ..model.pipeline import Array
+from ..model.rivals import rival
+from ..model.spec import BASE_MODEL
 from ..recordings import read_recording
 from ..recordings.recording import OUTPUTS, Recording
 from .covariance import Covariance, covariance
@@ -39,6 +41,7 @@ def identify(
     topics: Mapping[str, str] | None = None,
     seed: int = 0,
     branch: str = BRANCH.default,
+    model: str = BASE_MODEL,
     signals: Sequence[str] | None = None,
     hold_out: bool | str = True,
     profiles: bool = False,
@@ -46,6 +49,8 @@ def identify(
     interruptible: bool = False,
 ) -> Identification:
     """Fit the base valve's seven parameters to all measured signals, weighted by their noise.
+
+    Or fit a rival model to x.
 
     Parameters
     ----------
@@ -58,6 +63,8 @@ def identify(
         Seed of the global search; the same seed gives the same result.
     branch : {'zoh', 'printed'}
         Form of the condition of eq. (5).
+    model : str
+        'base' or the name of a rival, which is fitted to x alone, see `identify_rival`.
     signals : sequence of str, optional
         Outputs to fit; all that are measured by default.
     hold_out : bool or {'auto', 'time', 'bags', 'none'}
@@ -86,6 +93,8 @@ def identify(
 
     way = hold_out if isinstance(hold_out, str) else 'auto' if hold_out else 'none'
     recordings = _read(data, topics)
+    if model != BASE_MODEL:
+        return _identify_rival(model, recordings, seed, branch, way != 'none', progress)
     problem = Problem(recordings, branch, signals=signals)
     parts = parts_of(problem, way)
     problem.residuals(problem.middle())  # loads the machine code before the search
@@ -123,6 +132,37 @@ def identify(
         noise=dict(problem.noise),
         bounds={u.name: (u.lower, u.upper) for u in fitted.problem.unknowns.each},
         partial=partial,
+    )
+
+
+def _identify_rival(
+    model: str,
+    recordings: tuple[Recording, ...],
+    seed: int,
+    branch: str,
+    hold_out: bool,
+    progress: Progress | None,
+) -> Identification:
+    """Fit a rival, after the base valve if it needs that."""
+    from .rivals import identify_rival
+
+    report = progress or (lambda share, text: None)
+    base, share = None, 0.0
+    if not rival(model).data_driven:
+        share = 0.5
+        base = identify(
+            recordings,
+            seed=seed,
+            branch=branch,
+            hold_out=False,
+            progress=lambda done, text: report(share * done, text),
+        )
+    return identify_rival(
+        model,
+        recordings,
+        base=base,
+        hold_out=hold_out,
+        progress=lambda done, text: report(share + (1.0 - share) * done, text),
     )
 
 

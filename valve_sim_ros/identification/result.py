@@ -99,6 +99,7 @@ class Identification:
         return {
             'schema_version': SCHEMA_VERSION,
             'partial': self.partial,
+            'model': self.spec.model,
             'eta': _number(self.eta),
             'eta_by_signal': _numbers(self.eta_by_signal),
             'nrmse_by_signal': _numbers(self.nrmse),

@@ -68,7 +68,7 @@ class ValveSpec:
             name: parameter.checked(self.values.get(name, parameter.default))
             for name, parameter in declared.items()
         }
-        if self.model == BASE_MODEL and checked['f_d'] > checked['f_s']:
+        if checked.get('f_d', -np.inf) > checked.get('f_s', np.inf):
             raise ModelError(
                 f'f_d = {checked["f_d"]:g} % exceeds f_s = {checked["f_s"]:g} %: dynamic friction '
                 'cannot be above static friction; lower f_d or raise f_s, both in one change'
@@ -93,7 +93,9 @@ class ValveSpec:
             'model': values.pop(MODEL.name, self.model),
             'effects': self._checked_effects(values.pop(EFFECTS, self.effects)),
         }
-        if (options['model'], options['effects']) == (self.model, self.effects):
+        if options['model'] != self.model:
+            kept = {}
+        elif options['effects'] == self.effects:
             kept = dict(self.values)
         else:
             known = {p.name for p in ValveSpec(**options).parameters}

@@ -26,9 +26,14 @@ MOST_POINTS = 20_000
 
 def draw_fit(result: Identification, path: str | os.PathLike[str]) -> None:
     """Write `overlay` of the first recording as PNG, aside first and then renamed."""
+    save(overlay(result), path)
+
+
+def save(figure: Figure, path: str | os.PathLike[str]) -> None:
+    """Write a figure as PNG, aside first and then renamed."""
     path = Path(path)
     aside = path.with_name(f'.{path.stem}.part.png')
-    overlay(result).savefig(aside, dpi=110)
+    figure.savefig(aside, dpi=110)
     os.replace(aside, path)
 
 
@@ -45,9 +50,11 @@ def overlay(result: Identification, number: int = 0) -> Figure:
     recording, fitted = result.recordings[number], result.fitted[number]
     thin = _thin(recording.time.size)
     time = recording.time[thin]
-    figure = Figure(figsize=(WIDTH, 8.4), layout='constrained')
-    rows = figure.subplots(4, 1, sharex=True)
-    for axes, (name, label) in zip(rows, LABELS.items(), strict=True):
+    # data-driven models know no pressures
+    labels = {name: label for name, label in LABELS.items() if name in ('u', *fitted)}
+    figure = Figure(figsize=(WIDTH, 2.1 * len(labels)), layout='constrained')
+    rows = figure.subplots(len(labels), 1, sharex=True)
+    for axes, (name, label) in zip(rows, labels.items(), strict=True):
         if name == 'u':
             axes.step(time, recording.u[thin], where='post', color=COMMAND, label='command')
         else:

@@ -4,15 +4,25 @@
 
 from importlib import import_module
 from pkgutil import iter_modules
-from typing import Any
 
-RIVALS: dict[str, Any] = {
-    module.name: import_module(f'{__name__}.{module.name}').MODEL
-    for module in iter_modules(__path__)
-    if module.name != 'declaration'
+from ..errors import ModelError
+from .declaration import Rival
+
+_MODULES = [import_module(f'{__name__}.{module.name}') for module in iter_modules(__path__)]
+RIVALS: dict[str, Rival] = {
+    module.MODEL.name: module.MODEL for module in _MODULES if hasattr(module, 'MODEL')
 }
-"""Every rival by its name.
+"""Every rival by its name, in alphabetical order: each module here with a constant MODEL."""
 
-Each has `parameters`, `make()` giving a `kernels.Make`, and `start(p1, p2, x, theta)` giving the
-state array; state[0:3] is p1, p2, x.
-"""
+
+def rival(name: str) -> Rival:
+    """Return the rival of that name.
+
+    Raises
+    ------
+    ModelError
+        If there is none.
+    """
+    if name not in RIVALS:
+        raise ModelError(f'model = {name!r}: expected base or one of {", ".join(RIVALS)}')
+    return RIVALS[name]
