@@ -39,3 +39,44 @@ def test_the_hidden_effect_is_named(small_set, number):
     twins = [twin for effect in found['effects'] for twin in effect['indistinguishable_from']]
     assert named == key['effects'] or set(key['effects']) <= set(twins)
     assert found['verdict'] == ('missing_effect' if key['effects'] else 'adequate')
+
+
+def test_the_results_load_and_show_the_effect(small_set, tmp_path):
+    path, key = small_set[0]
+    told = CliRunner().invoke(main, ['diagnose', str(path), '--out', str(tmp_path), '--seed', '1'])
+    assert told.exit_code == 0, told.output
+    assert 'missing: ' in told.output
+    found = json.loads((tmp_path / 'diagnosis.json').read_text())
+    assert set(found) >= {'schema_version', 'signals', 'verdict', 'effects', 'where', 'gap', 'eta'}
+    base, augmented = (read_parameters(tmp_path / f'{n}.yaml') for n in ('base', 'augmented'))
+    assert augmented.effects == tuple(effect['id'] for effect in found['effects'])
+    u = np.repeat([20.0, 70.0, 40.0, 80.0], 200)
+    shown = [simulate(u, parameters=spec).p2 for spec in (base, augmented)]
+    assert np.abs(shown[0] - shown[1]).max() > 0.5
+    page = (tmp_path / 'report.html').read_text()
+    assert found['effects'][0]['id'] in page
+    assert 'http' not in page.replace('http://www.w3.org', '')
+    assert (tmp_path / 'decide_by.csv').exists()
+
+
+def test_the_effect_left_out_of_the_catalogue_is_not_named(small_set):
+    path, key = small_set[0]
+    found = diagnose(path, without=key['effects'])
+    assert key['effects'][0] not in [named.rung.effect for named in found.effects]
+    assert found.verdict == 'unknown_effect'
+
+
+def test_useless_data_are_refused_with_a_sentence(tmp_path):
+    time = 0.2 * np.arange(600)
+    still = Recording(time, np.full(600, 50.0), x=np.full(600, 48.0))
+    with pytest.raises(DiagnosisError, match='nothing moves'):
+        diagnose(still)
+    with pytest.raises(DiagnosisError, match='expected p1, p2 or x'):
+        diagnose(Recording(time, np.linspace(0.0, 50.0, 600)))
+    with pytest.raises(DiagnosisError, match='at least'):
+        diagnose(Recording(time[:50], np.linspace(0.0, 50.0, 50), x=np.zeros(50)))
+    told = CliRunner().invoke(
+        main, ['diagnose', str(tmp_path / 'no_bag'), '--out', str(tmp_path / 'o')]
+    )
+    assert told.exit_code == 1
+    assert not (tmp_path / 'o').exists()
