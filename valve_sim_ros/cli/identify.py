@@ -8,9 +8,7 @@ from typing import Any
 
 import click
 
-from ..identification.holdout import WAYS
-from ..model.spec import BASE_MODEL
-from ..recordings.recording import OUTPUTS
+from ..identification.choices import SIGNALS, WAYS
 from .options import progress_bar, read, reading_options
 
 INTERRUPTED = 130
@@ -25,11 +23,11 @@ INTERRUPTED = 130
     '--signal',
     'signals',
     multiple=True,
-    type=click.Choice(OUTPUTS),
+    type=click.Choice(SIGNALS),
     help='Output to fit; repeatable; all that are measured by default.',
 )
 @click.option(
-    '--model', default=BASE_MODEL, show_default=True, help='Valve model: base or a rival, as kano.'
+    '--model', default='base', show_default=True, help='Valve model: base or a rival, as kano.'
 )
 @click.option('--seed', default=0, show_default=True, help='Seed of the global search.')
 @click.option(

@@ -11,6 +11,7 @@ import numpy as np
 from ..model.pipeline import Array
 from ..model.spec import ValveSpec
 from ..recordings.recording import OUTPUTS
+from .choices import WAYS
 from .errors import IdentificationError
 from .fitness import fitness
 from .problem import Problem
@@ -20,7 +21,6 @@ from .uncertainty import Estimate
 from .watch import Watch
 
 THIRDS = {'first third': (0.0, 1.0 / 3.0), 'last third': (2.0 / 3.0, 1.0)}
-WAYS = ('auto', 'time', 'bags', 'none')
 MOST_BAGS = 8
 WORSE = 1.5
 """Errors held out that are larger than fitted ones by this factor call for words,"""
