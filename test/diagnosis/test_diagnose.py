@@ -4,15 +4,24 @@
 
 import json
 
+from blind import sets
+from click.testing import CliRunner
+import numpy as np
 import pytest
 
-from blind import sets
-from valve_sim_ros.diagnosis import diagnose
+from valve_sim_ros import (
+    diagnose,
+    DiagnosisError,
+    read_parameters,
+    Recording,
+    simulate,
+)
+from valve_sim_ros.cli import main
 
 SMALL_SET = (
-    ('singles', ('p1', 'p2'), 2),
-    ('singles', ('p1', 'p2'), 8),
-    ('singles', ('p1', 'p2', 'x'), 10),
+    ('singles', ('p1', 'p2'), 0),
+    ('singles', ('p1', 'p2'), 3),
+    ('singles', ('p1', 'p2', 'x'), 5),
     ('clean', ('p1', 'p2', 'x'), 0),
 )
 """Set, signals and number of the blind records that are diagnosed here."""
@@ -42,7 +51,7 @@ def test_the_hidden_effect_is_named(small_set, number):
 
 
 def test_the_results_load_and_show_the_effect(small_set, tmp_path):
-    path, key = small_set[0]
+    path, _ = small_set[0]
     told = CliRunner().invoke(main, ['diagnose', str(path), '--out', str(tmp_path), '--seed', '1'])
     assert told.exit_code == 0, told.output
     assert 'missing: ' in told.output

@@ -49,7 +49,7 @@ EFFECT = Effect(
             20.0,
             'linear',
             'Time by which p1 follows u late',
-            starts=(0.2, 0.5, 1.0, 2.0, 3.0),
+            starts=tuple(0.05 * k for k in range(1, 81)),
         ),
     ),
     slots={'command_slot': command, 'inlet_slot': inlet, 'tubing_slot': tubing},

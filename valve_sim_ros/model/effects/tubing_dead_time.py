@@ -32,7 +32,7 @@ EFFECT = Effect(
             20.0,
             'linear',
             'Time by which p2 follows p1 late',
-            starts=(0.2, 0.5, 1.0, 2.0, 3.0),
+            starts=tuple(0.05 * k for k in range(1, 81)),
         ),
     ),
     slots={'tubing_slot': tubing},
