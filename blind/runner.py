@@ -35,7 +35,7 @@ def verdict(path: Path, out: Path, seed: int, without: tuple[str, ...]) -> None:
         (out / name).unlink(missing_ok=True)
     began = time.perf_counter()
     try:
-        diagnose([path], seed=seed, without=without).write(out, report=False)
+        diagnose([path], seed=seed, without=without).write(out)
     except Exception:
         (out / 'error.txt').write_text(traceback.format_exc(), encoding='utf-8')
     else:

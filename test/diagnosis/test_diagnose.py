@@ -4,11 +4,11 @@
 
 import json
 
-from blind import sets
 from click.testing import CliRunner
 import numpy as np
 import pytest
 
+from blind import sets
 from valve_sim_ros import (
     diagnose,
     DiagnosisError,

@@ -41,6 +41,7 @@ def diagnose_command(
     """
     from ..diagnosis import diagnose
     from ..model.parameter_file import read_parameters
+    from ..report.diagnosis import write_report
 
     spec = read_parameters(params) if params else None
     with progress_bar() as progress:
@@ -57,5 +58,6 @@ def diagnose_command(
             click.echo(line)
     for line in result.lines():
         click.echo(line)
-    written = result.write(out)
+    written = [*result.write(out), out / 'report.html']
+    write_report(result, written[-1])
     click.echo('written: ' + ', '.join(map(str, written)))

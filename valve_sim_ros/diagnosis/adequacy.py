@@ -26,7 +26,7 @@ class Leftover(NamedTuple):
 
     mean_square: float
     floor: float
-    count: int
+    samples: int
     inflation: float
 
     @property

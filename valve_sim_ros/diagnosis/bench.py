@@ -9,6 +9,7 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 from ..model.composition import compose
 from ..model.kernels import scored
@@ -31,6 +32,9 @@ LEAST_NOISE = 0.02
 """Smallest noise taken seriously [% of span]."""
 
 
+Rows = npt.NDArray[np.intp]
+
+
 class Grid(NamedTuple):
     """A stretch as the compiled model receives it: m samples and changes of the command.
 
@@ -40,7 +44,7 @@ class Grid(NamedTuple):
 
     u: Array
     dt: Array
-    rows: Array
+    rows: Rows
     forced: Array
     targets: dict[str, Array]
     scales: dict[str, Array]
@@ -118,9 +122,11 @@ class Stretch:
             targets[name], scales[name] = nothing.copy(), nothing.copy()
             targets[name][rows] = values
             scales[name][rows] = 1.0 / self.noise[name]
+        steps: Array = np.diff(time[order], prepend=time[order][:1])
+        steps = np.round(steps, 9)  # equal steps stay equal
         return Grid(
             np.concatenate([seen, self.u[changed]])[order],
-            np.round(np.diff(time[order], prepend=time[order][:1]), 9),  # equal steps stay equal
+            steps,
             rows,
             forced,
             targets,

@@ -60,10 +60,11 @@ class TestSignal:
         pieces: list[Array] = []
 
         def hold(level: float, seconds: float) -> None:
-            pieces.append(np.full(max(round(seconds / period), 1), level))
+            pieces.append(np.full(max(round(seconds / period), 1), level, dtype=np.float64))
 
         def ramp(start: float, stop: float) -> None:
-            pieces.append(np.linspace(start, stop, round(abs(stop - start) / SPEED / period)))
+            steps = round(abs(stop - start) / SPEED / period)
+            pieces.append(np.linspace(start, stop, steps, dtype=np.float64))
 
         for level in (*STROKES, *STAIRS):
             hold(level, HOLD)
@@ -76,7 +77,7 @@ class TestSignal:
             hold(50.0 + turn, 15.0)
             hold(50.0 - turn, 15.0)
         u = np.concatenate(pieces)
-        return cls(period * np.arange(u.size), u)
+        return cls(period * np.arange(u.size, dtype=np.float64), u)
 
     def csv(self) -> str:
         """Return it as CSV with columns t and u."""

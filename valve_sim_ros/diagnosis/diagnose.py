@@ -10,12 +10,13 @@ import os
 from ..model.spec import ValveSpec
 from ..recordings import read_recording
 from ..recordings.recording import Recording
+from .adequacy import leftover
 from .bench import Bench
 from .conditions import Place, places
 from .errors import DiagnosisError
 from .fitting import Fitter, starting_valve, Valve
 from .intervals import intervals
-from .ladder import climb, Ladder
+from .ladder import climb, concluded, Ladder
 from .proof import prove
 from .result import Diagnosis, Named
 from .stages import Group, groups
@@ -171,12 +172,32 @@ def _climb_all(
                 share + width * done, text
             ),
         )
+        if FEEDBACK & {rung.effect for rung in ladder.rungs}:
+            ladder = _settled(fitter, parts, ladder)
         ladders.append(ladder)
         valve = ladder.valve
         if ladder.outcome == 'unknown_effect':
             fitter.drive = (*fitter.drive, group.signal)
     fitter.drive = ()
     return ladders, base
+
+
+FEEDBACK = {'positioner_loop', 'chamber_volume'}
+"""Effects by which the stem acts on the stages before it."""
+CYCLES = 2
+
+
+def _settled(fitter: Fitter, parts: Sequence[Group], ladder: Ladder) -> Ladder:
+    """Refit all stages in turn where a later one acts on an earlier one."""
+    valve = ladder.valve
+    for cycle in range(CYCLES):
+        for group in parts:
+            if cycle == 0 and group is not ladder.group:
+                valve = fitter.base(group, valve, fitter.drive)
+            else:
+                valve = fitter.fit(valve, fitter.problem(group, valve))
+    after = leftover(fitter.residuals(valve, ladder.group.signal))
+    return concluded(replace(ladder, valve=valve, after=after))
 
 
 def _plain(

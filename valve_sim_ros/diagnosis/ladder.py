@@ -137,7 +137,7 @@ def judged(
 ) -> Rung | None:
     """Return the step to the best runner if the evidence is enough."""
     best_after = leftover(fitter.residuals(runners[0], group.signal))
-    inflation, count = best_after.inflation, best_after.count
+    inflation, count = best_after.inflation, best_after.samples
     tops = odds.best_per_effect(runners)
     gains = {
         each.candidates[-1].effect: odds.gain(now.cost, each, inflation, count) for each in tops
@@ -147,7 +147,8 @@ def judged(
     after = leftover(fitter.residuals(best, group.signal))
     change = before.mean_square - after.mean_square
     least = odds.LEAST_SHIFT if candidate.effect in odds.LASTING else odds.LEAST_CHANGE
-    if gains[candidate.effect] < odds.ENOUGH or change < least:
+    least_excess = odds.LEAST_EXCESS.get(group.signal, 0.0)
+    if gains[candidate.effect] < odds.ENOUGH or change < least or before.excess < least_excess:
         return None
     floor = min(before.floor, after.floor)
     missing = max(before.mean_square - floor, 1e-9)

@@ -27,6 +27,9 @@ LASTING = (
 """Effects that shift a signal for long: small ones are nothing but the bias of a fit."""
 LEAST_SHIFT, LEAST_CHANGE = 0.2, 0.015
 """Least mean square that such an effect, and any other, must remove [noise]."""
+LEAST_EXCESS = {'p2': 0.5}
+"""Least excess before a name in this signal: where samples are taken just as commands arrive, the
+start of each move of p2 scatters by up to a sample, and slow or late chambers fit that a little."""
 ADEQUATE = 0.8
 """Excess over the noise that still counts as adequate (other solvers, jitter)."""
 CLEAN = 0.25

@@ -3,13 +3,15 @@
 """The proof: both valves fitted to the first part of the data and held against the rest."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from ..identification.fitness import fitness
 from ..model.pipeline import Array
 from ..recordings.recording import OUTPUTS
+from .bench import Stretch
+from .conditions import Mask
 from .fitting import Fitter, Valve
 from .stages import Group
 from .unknowns import complete
@@ -107,22 +109,17 @@ def prove(
     return gaps, refits[0], refits[1]
 
 
-def without_effects(valve: Valve) -> Valve:
-    """Return the valve without the effects that were added."""
-    return replace(valve, effects=(), freed=(), candidates=())
-
-
-def _parts(stretches: Sequence[object], total: int) -> list[Array]:
+def _parts(stretches: Sequence[Stretch], total: int) -> list[Mask]:
     """Return which samples of each stretch are held out."""
     first, parts = 0, []
     for stretch in stretches:
-        n = stretch.u.size  # type: ignore[attr-defined]
+        n = stretch.u.size
         parts.append((first + np.arange(n)) >= (1.0 - HELD_OUT) * total)
         first += n
     return parts
 
 
-def _halves(error: Array, held_out: Array) -> Halves:
+def _halves(error: Array, held_out: Mask) -> Halves:
     """Return the root mean squares of an error, outliers clipped."""
     values = []
     for part in (error[~held_out], error[held_out]):
@@ -131,7 +128,7 @@ def _halves(error: Array, held_out: Array) -> Halves:
     return Halves(*values)
 
 
-def _etas(measured: Array, model: Array, held_out: Array) -> Halves:
+def _etas(measured: Array, model: Array, held_out: Mask) -> Halves:
     return Halves(
         fitness(measured[~held_out], model[~held_out]),
         fitness(measured[held_out], model[held_out]),

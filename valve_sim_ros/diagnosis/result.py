@@ -166,15 +166,13 @@ class Diagnosis:
             )
         return found
 
-    def write(self, folder: str | os.PathLike[str], report: bool = True) -> list[Path]:
-        """Write all results into a folder, each aside first and then renamed into place.
+    def write(self, folder: str | os.PathLike[str]) -> list[Path]:
+        """Write all but the page into a folder, each aside first and then renamed into place.
 
         Parameters
         ----------
         folder : path-like
             Made if it does not exist.
-        report : bool
-            Also draw report.html.
 
         Returns
         -------
@@ -193,11 +191,6 @@ class Diagnosis:
         if self.verdict != 'adequate':
             written.append(folder / 'decide_by.csv')
             _write(written[-1], self.test_signal.csv())
-        if report:
-            from ..report.diagnosis import write_report
-
-            written.append(folder / 'report.html')
-            write_report(self, written[-1])
         return written
 
     def _effect(self, named: Named) -> dict[str, Any]:

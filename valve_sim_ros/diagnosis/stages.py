@@ -102,7 +102,9 @@ class Group:
 
 def groups(signals: Sequence[str]) -> list[Group]:
     """Return the groups for the measured signals, in the order of the flow."""
-    found, pending, seen = [], [], []
+    found: list[Group] = []
+    pending: list[str] = []
+    seen: list[str] = []
     for name, stage in STAGE_OF.items():
         pending.append(stage)
         if name in signals:

@@ -4,6 +4,7 @@
 
 from collections.abc import Callable, Mapping
 import json
+from pathlib import Path
 from typing import Any
 
 from rclpy.executors import ExternalShutdownException
@@ -47,10 +48,12 @@ class DiagnoseService:
     def _diagnose(self, data: Any, options: Mapping[str, Any], folder: str) -> str:
         """Diagnose, publish, write; return the text."""
         from ..diagnosis import diagnose  # heavy, and few ever ask
+        from ..report.diagnosis import write_report
 
         found = diagnose(data, progress=self._progress, **options)
         if folder:
             found.write(folder)
+            write_report(found, Path(folder) / 'report.html')
         text = json.dumps(found.as_json(), allow_nan=False)
         self._diagnosis.publish(String(data=text))
         return '\n'.join(found.lines())
