@@ -20,7 +20,7 @@ from valve_sim_ros.cli import main
 
 SMALL_SET = (
     ('singles', ('p1', 'p2'), 0),
-    ('singles', ('p1', 'p2'), 3),
+    ('singles', ('p1', 'p2'), 2),
     ('singles', ('p1', 'p2', 'x'), 5),
     ('clean', ('p1', 'p2', 'x'), 0),
 )

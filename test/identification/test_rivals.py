@@ -101,7 +101,7 @@ def test_not_worse_than_a_dense_grid():
 def test_segments_start_afresh():
     s = simulate(ramps(), parameters={'model': 'he', 'f_s': 7.3, 'f_d': 3.1})
     time, x = s.t.copy(), s.x.copy()
-    time[700:] += 60.0
+    time[1000:] += 60.0  # where the force on the stem is that of a fresh start
     x[300:310] = np.nan
     result = identify_rival('he', (Recording(time, s.u, x=x),))
     assert len(result.recordings[0].segments) == 2
@@ -112,7 +112,7 @@ def test_segments_start_afresh():
 def test_files_load_into_the_plant(name, tmp_path):
     write_recording(record(ramps(600), f_s=6.0, f_d=4.0, **FAST), tmp_path / 'bag')
     arguments = [str(tmp_path / 'bag'), '--out', str(tmp_path), '--model', name]
-    done = CliRunner().invoke(main, ['identify', *arguments, '--no-hold-out'])
+    done = CliRunner().invoke(main, ['identify', *arguments, '--hold-out', 'none'])
     assert done.exit_code == 0, done.output
     content = json.loads((tmp_path / 'identify.json').read_text())
     assert content['model'] == name

@@ -159,6 +159,8 @@ class Bench:
             for name, values in stretch.measured.items():
                 values[_wild(values, OUTLIER * self.noise[name])] = np.nan
             stretch.noise = {n: self._uncertainty(n, v) for n, v in stretch.measured.items()}
+            if not self.signals:
+                break
             settled = np.arange(stretch.u.size) >= self._settled(stretch)
             stretch.recount({n: np.where(settled, v, np.nan) for n, v in stretch.measured.items()})
             if 'x' in self.signals:

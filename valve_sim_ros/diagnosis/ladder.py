@@ -122,8 +122,6 @@ def climb(
             break
         if rung.closed < odds.EXPLAINED and rung.after.excess > odds.CLEAN:
             guess = rung
-            if rung.after.excess <= odds.ADEQUATE:
-                break  # no more than the null model leaves, and this does not explain it
         rungs.append(rung)
         now, before = rung.valve, rung.after
         candidates = [c for c in candidates if c.effect != rung.effect]

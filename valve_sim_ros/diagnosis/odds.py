@@ -28,13 +28,13 @@ LASTING = (
 LEAST_SHIFT, LEAST_CHANGE = 0.2, 0.015
 """Least mean square that such an effect, and any other, must remove [noise]."""
 LEAST_EXCESS = {'p2': 0.5}
-"""Least excess before a name in this signal: where samples are taken just as commands arrive, the
-start of each move of p2 scatters by up to a sample, and slow or late chambers fit that a little."""
+"""Least excess before a name in this signal: where samples are taken just as commands arrive,
+the start of each move of p2 scatters by up to a sample, and late chambers fit that a little."""
 ADEQUATE = 0.8
 """Excess over the noise that still counts as adequate (other solvers, jitter)."""
 CLEAN = 0.25
 """Excess that counts as noise once an effect is added."""
-EXPLAINED = 0.6
+EXPLAINED = 0.85
 """Least part of the excess that a name must close, else the effect is unknown."""
 TWIN_GAIN, TWIN_SHARE = 12.0, 0.003
 """Rivals whose gain is less than this, or this share of the gain, behind cannot be excluded."""

@@ -53,7 +53,7 @@ EFFECT = Effect(
             'overdrive',
             'o',
             '%',
-            100.0,
+            0.0,
             0.0,
             100.0,
             'linear',
