@@ -172,6 +172,6 @@ def concluded(ladder: Ladder) -> Ladder:
     explained = closed >= odds.EXPLAINED or ladder.after.excess <= odds.CLEAN
     if ladder.rungs and explained:
         return replace(ladder, outcome='missing_effect')
-    if ladder.before.excess > odds.ADEQUATE:
+    if ladder.before.excess > odds.ADEQUATE[ladder.group.signal]:
         return replace(ladder, outcome='unknown_effect')
     return replace(ladder, valve=ladder.base, after=ladder.before, rungs=())

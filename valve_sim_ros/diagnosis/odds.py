@@ -30,7 +30,7 @@ LEAST_SHIFT, LEAST_CHANGE = 0.2, 0.015
 LEAST_EXCESS = {'p2': 0.5}
 """Least excess before a name in this signal: where samples are taken just as commands arrive,
 the start of each move of p2 scatters by up to a sample, and late chambers fit that a little."""
-ADEQUATE = 0.8
+ADEQUATE = {'p1': 0.8, 'p2': 1.2, 'x': 0.8}
 """Excess over the noise that still counts as adequate (other solvers, jitter)."""
 CLEAN = 0.25
 """Excess that counts as noise once an effect is added."""
