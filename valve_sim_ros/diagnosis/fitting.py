@@ -36,7 +36,12 @@ GRID: dict[str, tuple[float, ...]] = {
     'f_s': (0.5, 1.5, 3.5, 7.0, 12.0),
     'f_d/f_s': (0.3, 0.55, 0.8),
 }
-"""Where the search for the base valve starts."""
+"""Where the search for the base valve starts, and more finely if only the stem is sought."""
+STEM_GRID: dict[str, tuple[float, ...]] = {
+    'f_s': (0.5, 1.0, 1.6, 2.4, 3.4, 4.6, 6.0, 7.5, 9.0, 11.0, 13.0, 16.0),
+    'f_d/f_s': (0.3, 0.45, 0.6, 0.75, 0.9),
+}
+STEM_STARTS = 6
 
 
 SHORT = 4
@@ -160,10 +165,19 @@ class Fitter:
             self._settle_phase(group, valve)
             valve = replace(valve, values={**valve.values, 'phase': self.phase_start})
         problem = (self.unknowns(group), group.signal, tuple(drive))
-        starts = [valve.values, *({**valve.values, **there} for there in grid(problem[0]))]
-        found = self._best_of(valve, starts, problem, 3)
-        if 'p2-x' in group.stages:
-            found += [self.evolve(each, problem, 30, coarse=COARSE) for each in found]
+        fresh = {n: START[n] for n in ('a_1/a_2', 'damping')} if 'p2-x' in group.stages else {}
+        starts = [{**valve.values, **fresh, **there} for there in grid(problem[0])]
+        starts.append(dict(valve.values))
+        alone = group.stages == ('p2-x',)
+        found = self._best_of(valve, starts, problem, STEM_STARTS if alone else 3)
+        if 'p2-x' not in group.stages:
+            return self.refined(found[0], problem)
+        # put to rest where it was seen to rest, a stem that slips too late is only a little wrong
+        eased = (problem[0], problem[1], (*problem[2], 'x'))
+        eases = self._best_of(valve, starts, eased, STEM_STARTS if alone else 3)
+        best = min((self.evolve(each, eased, 30, coarse=COARSE) for each in eases), key=_cost)
+        found.append(self.fit(best, problem, SHORT))
+        found += [self.evolve(each, problem, 30, coarse=COARSE) for each in (found[0], found[-1])]
         return self.refined(min(found, key=_cost), problem)
 
     def refined(self, valve: Valve, problem: 'Problem') -> Valve:
@@ -249,12 +263,20 @@ class Fitter:
         own = candidate.starts(self._peaks(residual))
         bases = ({}, *friction_grid(group)) if len(own) <= MOST_STARTS else ({},)
         problem = self.problem(group, there)
-        best = []
-        for start in own:
-            starts = [{**candidate.neutral, **valve.values, **base, **start} for base in bases]
-            best.append(self._scan(there, starts, problem, SCREENING)[0])
-        best = sorted(best, key=_cost)[:SCREENED]
-        return min((self.fit(each, problem, SHORT, SCREENING) for each in best), key=_cost)
+        starts = [
+            [{**candidate.neutral, **valve.values, **base, **start} for base in bases]
+            for start in own
+        ]
+
+        def best(way: 'Problem', count: int) -> list[Valve]:
+            each = [self._scan(there, some, way, SCREENING)[0] for some in starts]
+            return sorted(each, key=_cost)[:count]
+
+        found = best(problem, SCREENED)
+        if 'p2-x' in group.stages:
+            eased = (problem[0], problem[1], (*problem[2], 'x'))
+            found += [self.fit(each, eased, SHORT, SCREENING) for each in best(eased, 1)]
+        return min((self.fit(each, problem, SHORT, SCREENING) for each in found), key=_cost)
 
     def _peaks(self, residual: Array) -> tuple[float, ...]:
         """Return the frequencies at which a residual swings most, and their neighbours [Hz]."""
@@ -324,7 +346,8 @@ def _cost(valve: Valve) -> float:
 def grid(unknowns: Sequence[Unknown]) -> list[dict[str, float]]:
     """Return the starts of the base valve's unknowns."""
     names = [unknown.name for unknown in unknowns if unknown.name in GRID]
-    return [dict(zip(names, point, strict=True)) for point in product(*(GRID[n] for n in names))]
+    values = STEM_GRID if set(names) == set(STEM_GRID) else GRID
+    return [dict(zip(names, point, strict=True)) for point in product(*(values[n] for n in names))]
 
 
 def friction_grid(group: Group) -> list[dict[str, float]]:

@@ -41,9 +41,13 @@ TWIN_GAIN, TWIN_SHARE = 12.0, 0.003
 
 
 def gain(before: float, after: Valve, inflation: float, count: int) -> float:
-    """Return what one more effect brings: likelihood of independent samples less BIC."""
+    """Return what one more effect brings: likelihood of independent samples less BIC.
+
+    A candidate that was looked for in many places pays for each of them.
+    """
+    candidate = after.candidates[-1]
     independent = max(count / inflation, 10.0)
-    penalty = 0.5 * len(after.candidates[-1].names) * math.log(independent)
+    penalty = 0.5 * len(candidate.names) * math.log(independent) + math.log(candidate.places)
     return 0.5 * (before - after.cost) / inflation - penalty
 
 

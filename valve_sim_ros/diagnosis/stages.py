@@ -5,6 +5,7 @@
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from itertools import product
+import math
 
 from ..model.declarations import EffectParameter
 from ..model.effects import CATALOGUE
@@ -30,6 +31,11 @@ class Candidate:
     def neutral(self) -> dict[str, float]:
         """All parameters of the effect at their neutral values."""
         return {f'{self.effect}.{p.name}': p.neutral for p in CATALOGUE[self.effect].parameters}
+
+    @property
+    def places(self) -> int:
+        """Number of places in which a search looks for it."""
+        return math.prod(len(starts_of(declared(self.effect, name))) for name in self.names)
 
     def starts(self, peaks: tuple[float, ...] = ()) -> list[dict[str, float]]:
         """Return the values from which a search starts, the others neutral.
