@@ -5,6 +5,7 @@
 from collections.abc import Mapping, Sequence
 import math
 
+from ..model.effects import CATALOGUE
 from .adequacy import Leftover
 from .fitting import Valve
 from .unknowns import declared
@@ -36,8 +37,9 @@ CLEAN = 0.25
 """Excess that counts as noise once an effect is added."""
 EXPLAINED = 0.85
 """Least part of the excess that a name must close, else the effect is unknown."""
-TWIN_GAIN, TWIN_SHARE = 12.0, 0.003
-"""Rivals whose gain is less than this, or this share of the gain, behind cannot be excluded."""
+TWIN_GAIN, TWIN_SHARE, KNOWN_TWIN_SHARE = 12.0, 0.003, 0.02
+"""Rivals whose gain is less than this, or this share of the gain, behind cannot be excluded; those
+that are declared to look alike need not come as close."""
 
 
 def gain(before: float, after: Valve, inflation: float, count: int) -> float:
@@ -79,8 +81,12 @@ def further(gained: float, before: Leftover, closed: float) -> bool:
 
 def close_rivals(gains: Mapping[str, float], best: str) -> list[str]:
     """Return the effects that the data do not tell from the best, closest first."""
-    limit = max(TWIN_GAIN, TWIN_SHARE * gains[best])
-    near = [name for name in gains if name != best and gains[best] - gains[name] < limit]
+
+    def limit(name: str) -> float:
+        known = name in CATALOGUE[best].twins or best in CATALOGUE[name].twins
+        return max(TWIN_GAIN, (KNOWN_TWIN_SHARE if known else TWIN_SHARE) * gains[best])
+
+    near = [name for name in gains if name != best and gains[best] - gains[name] < limit(name)]
     return sorted(near, key=lambda name: -gains[name])
 
 
