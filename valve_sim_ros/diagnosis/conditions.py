@@ -9,7 +9,8 @@ import numpy as np
 import numpy.typing as npt
 
 from ..model.pipeline import Array
-from .bench import Bench, Stretch
+from .bench import Bench
+from .stretch import Stretch
 
 Mask = npt.NDArray[np.bool_]
 RECENT = 3.0

@@ -11,7 +11,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..model.pipeline import Array, HUBER
+from ..model.pipeline import Array
+from ..model.scoring import HUBER
 
 
 class Minimum(NamedTuple):

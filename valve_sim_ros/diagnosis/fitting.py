@@ -5,7 +5,7 @@
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
-from itertools import product, repeat
+from itertools import repeat
 import math
 import os
 
@@ -17,30 +17,9 @@ from .bench import Bench, MIXED_JITTER
 from .descent import descend, walk
 from .evolution import evolve
 from .stages import Candidate, Group
+from .starts import friction_grid, grid, START
 from .unknowns import complete, EARLY, LATE, PHASE, to_point, to_values, Unknown
 
-START: dict[str, float] = {
-    'f_d1': 0.5,
-    'T_g1': 5.0,
-    'T_g2': 5.0,
-    'f_s': 4.0,
-    'f_d/f_s': 0.6,
-    'a_1/a_2': 12.0,
-    'damping': 1.8,
-    'phase': 0.0,
-}
-GRID: dict[str, tuple[float, ...]] = {
-    'f_d1': (0.1, 0.5, 1.5, 4.0),
-    'T_g1': (0.7, 2.5, 8.0, 25.0),
-    'T_g2': (0.7, 2.5, 8.0, 25.0),
-    'f_s': (0.5, 1.5, 3.5, 7.0, 12.0),
-    'f_d/f_s': (0.3, 0.55, 0.8),
-}
-"""Where the search for the base valve starts, and more finely if only the stem is sought."""
-STEM_GRID: dict[str, tuple[float, ...]] = {
-    'f_s': (0.5, 1.0, 1.6, 2.4, 3.4, 4.6, 6.0, 7.5, 9.0, 11.0, 13.0, 16.0),
-    'f_d/f_s': (0.3, 0.45, 0.6, 0.75, 0.9),
-}
 STEM_STARTS = 6
 
 
@@ -341,24 +320,6 @@ Problem = tuple[tuple[Unknown, ...], str, tuple[str, ...]]
 def _cost(valve: Valve) -> float:
     """Return what to sort by."""
     return valve.cost
-
-
-def grid(unknowns: Sequence[Unknown]) -> list[dict[str, float]]:
-    """Return the starts of the base valve's unknowns."""
-    names = [unknown.name for unknown in unknowns if unknown.name in GRID]
-    values = STEM_GRID if set(names) == set(STEM_GRID) else GRID
-    return [dict(zip(names, point, strict=True)) for point in product(*(values[n] for n in names))]
-
-
-def friction_grid(group: Group) -> list[dict[str, float]]:
-    """Return starts of the friction, which a valve without the effect may have far off."""
-    if 'p2-x' not in group.stages:
-        return []
-    return [
-        {'f_s': f_s, 'f_d/f_s': share, 'a_1/a_2': START['a_1/a_2'], 'damping': START['damping']}
-        for f_s in GRID['f_s']
-        for share in GRID['f_d/f_s']
-    ]
 
 
 def starting_valve(bench: Bench) -> Valve:

@@ -10,10 +10,10 @@ import numpy as np
 from ..identification.fitness import fitness
 from ..model.pipeline import Array
 from ..recordings.recording import OUTPUTS
-from .bench import Stretch
 from .conditions import Mask
 from .fitting import Fitter, Valve
 from .stages import Group
+from .stretch import Stretch
 from .unknowns import complete
 
 HELD_OUT = 0.3

@@ -19,6 +19,7 @@ from numba.core.dispatcher import Dispatcher
 
 from . import pipeline
 from .composition import slot_function
+from .scoring import run_scored
 
 SLOTS = tuple(name for name in vars(pipeline) if name.endswith('_slot'))
 """Names of the places in the pipeline where an effect plugs in."""
@@ -99,6 +100,6 @@ def make(effects: bool = False) -> Make:
 
 @cache
 def scored() -> Any:
-    """Return `pipeline.run_scored` with the whole catalogue of effects."""
+    """Return `scoring.run_scored` with the whole catalogue of effects."""
     slots = {name: slot_function(name) for name in SLOTS}
-    return kept(pipeline.run_scored, slots, 'effects')
+    return kept(run_scored, slots, 'effects')

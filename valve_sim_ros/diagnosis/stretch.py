@@ -1,0 +1,117 @@
+# Copyright 2026 The valve_sim_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""A run of samples without a gap, and the grids on which the compiled model runs beside it."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from ..model.pipeline import Array
+from ..recordings.recording import OUTPUTS
+
+KEPT_GRIDS = 60
+Rows = npt.NDArray[np.intp]
+
+
+class Grid(NamedTuple):
+    """A stretch as the compiled model receives it: m samples and changes of the command.
+
+    u, dt, nothing have shape (m,), forced (3, m), rows (n,); targets and scales hold (m,) per
+    signal.
+    """
+
+    u: Array
+    dt: Array
+    rows: Rows
+    forced: Array
+    targets: dict[str, Array]
+    scales: dict[str, Array]
+    nothing: Array
+
+
+@dataclass
+class Stretch:
+    """A run of samples without a gap, shape (n,) each; outputs are NaN where lost.
+
+    `counts` are the measured outputs where they count, `noise` their uncertainty, `rests` x
+    where it rests.
+    """
+
+    time: Array
+    u: Array
+    measured: dict[str, Array]
+    counts: dict[str, Array] = field(default_factory=dict)
+    noise: dict[str, Array] = field(default_factory=dict)
+    rests: Array = field(default_factory=lambda: np.empty(0))
+    _grids: dict[Any, Grid] = field(default_factory=dict)
+
+    @cached_property
+    def first(self) -> dict[str, float]:
+        """The first value of each output, that of the signal before it where not measured."""
+        found, fallback = {}, float(self.u[0])
+        for name in OUTPUTS:
+            if name in self.measured:
+                fallback = float(np.nanmedian(self.measured[name][:3]))
+            found[name] = fallback
+        return found
+
+    def grid(self, phase: float, drive: tuple[str, ...]) -> Grid:
+        """Return the stretch with the commands moved by a share of a period.
+
+        With `phase` > 0 a change of u that the recording shows at a sample came that share of a
+        period earlier, with `phase` < 0 later.
+        """
+        key = round(phase, 4), drive
+        found = self._grids.get(key)  # other threads may clear them meanwhile
+        if found is None:
+            if len(self._grids) > KEPT_GRIDS:
+                self._grids.clear()
+            found = self._grids[key] = self._moved(*key)
+        return found
+
+    def recount(self, counts: Mapping[str, Array]) -> None:
+        """Replace what counts."""
+        self.counts = dict(counts)
+        self._grids.clear()
+
+    def _moved(self, phase: float, drive: tuple[str, ...]) -> Grid:
+        n = self.time.size
+        changed = np.flatnonzero(np.diff(self.u)) + 1
+        seen = self.u
+        if phase > 0.0:
+            extra = self.time[changed] - phase * (self.time[changed] - self.time[changed - 1])
+        elif phase < 0.0:
+            seen = np.concatenate([self.u[:1], self.u[:-1]])
+            step = np.diff(self.time, append=2 * self.time[-1] - self.time[-2])
+            extra = self.time[changed] - phase * step[changed]
+        else:
+            changed, extra = changed[:0], self.time[:0]
+        time = np.concatenate([self.time, extra])
+        order = np.argsort(time, kind='stable')
+        rows = np.empty(time.size, dtype=np.intp)
+        rows[order] = np.arange(time.size)
+        rows = rows[:n]
+        forced, nothing = np.full((3, time.size), np.nan), np.full(time.size, np.nan)
+        for name in drive:
+            seen_there = self.rests if name == 'x' else self.measured[name]
+            forced[OUTPUTS.index(name), rows] = seen_there
+        targets, scales = {}, {}
+        for name, values in self.counts.items():
+            targets[name], scales[name] = nothing.copy(), nothing.copy()
+            targets[name][rows] = values
+            scales[name][rows] = 1.0 / self.noise[name]
+        steps: Array = np.diff(time[order], prepend=time[order][:1])
+        steps = np.round(steps, 9)  # equal steps stay equal
+        return Grid(
+            np.concatenate([seen, self.u[changed]])[order],
+            steps,
+            rows,
+            forced,
+            targets,
+            scales,
+            nothing,
+        )
