@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """The parts of the diagnosis, each held against what is known."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.signal import lfilter
@@ -13,6 +15,7 @@ from valve_sim_ros.diagnosis.conditions import places
 from valve_sim_ros.diagnosis.decision import TestSignal
 from valve_sim_ros.diagnosis.descent import cost_of, descend, walk
 from valve_sim_ros.diagnosis.evolution import evolve
+from valve_sim_ros.diagnosis.fitting import Fitter, starting_valve
 from valve_sim_ros.diagnosis.proof import closed
 from valve_sim_ros.diagnosis.stages import groups
 from valve_sim_ros.diagnosis.unknowns import complete
@@ -146,3 +149,20 @@ def test_the_deciding_commands_reach_both_stops_and_rest():
     assert signal.u.max() == 100.0
     assert np.all(np.diff(signal.time) > 0.0)
     assert signal.csv().splitlines()[0] == 't,u'
+
+
+def test_a_run_that_blows_up_never_fits():
+    bench = Bench([recording(noise=0.2)])
+    fitter = Fitter(bench)
+    valve = replace(starting_valve(bench), values={**starting_valve(bench).values, 'p2_0': np.nan})
+    assert fitter.score(valve, 'p2') == np.inf
+    assert cost_of(fitter.residuals(valve, 'p2')) > 1e6
+
+
+def test_a_recording_may_begin_with_lost_samples():
+    record = recording(noise=0.2)
+    lost = {name: record.output(name).copy() for name in record.signals}
+    for values in lost.values():
+        values[:5] = np.nan
+    bench = Bench([Recording(record.time, record.u, **lost)])
+    assert all(np.isfinite(value) for value in bench.stretches[0].first.values())

@@ -9,7 +9,7 @@ import os
 
 from ..model.spec import ValveSpec
 from ..recordings import read_recording
-from ..recordings.recording import Recording
+from ..recordings.recording import OUTPUTS, Recording
 from .adequacy import leftover
 from .bench import Bench
 from .conditions import Place, places
@@ -103,10 +103,20 @@ def _read(data: Data | Sequence[Data], topics: Mapping[str, str] | None) -> list
     each = [data] if isinstance(data, Recording | str | os.PathLike) else list(data)
     if not each:
         raise DiagnosisError('no data given: expected at least one bag or CSV file')
-    return [
+    recordings = [
         item if isinstance(item, Recording) else read_recording(item, topics=topics)
         for item in each
     ]
+    thin = math.ceil(sum(map(len, recordings)) / MOST_SAMPLES)
+    return recordings if thin <= 1 else [_thinned(recording, thin) for recording in recordings]
+
+
+def _thinned(recording: Recording, thin: int) -> Recording:
+    """Return every so many samples: a valve is slow, and searches take their time per sample."""
+    p1, p2, x = (
+        recording.output(name)[::thin] if name in recording.signals else None for name in OUTPUTS
+    )
+    return Recording(recording.time[::thin], recording.u[::thin], p1, p2, x, recording.provenance)
 
 
 def _refuse_useless(bench: Bench) -> None:
@@ -128,7 +138,7 @@ def _refuse_useless(bench: Bench) -> None:
         )
 
 
-LEAST_SAMPLES = 200
+LEAST_SAMPLES, MOST_SAMPLES = 200, 20_000
 
 
 def _known(valve: Valve, spec: ValveSpec | None) -> Valve:

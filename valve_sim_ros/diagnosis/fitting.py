@@ -23,6 +23,8 @@ from .unknowns import complete, EARLY, LATE, PHASE, to_point, to_values, Unknown
 STEM_STARTS = 6
 
 
+HOPELESS = 1e3
+"""Residual of a run that is not finite [noise]."""
 SHORT = 4
 """Steps of a descent that only shows where it leads."""
 SCREENING, COARSE = 0.1, 0.04
@@ -74,7 +76,10 @@ class Fitter:
         self.evaluations += 1
         driven = self.drive if drive is None else drive
         results = self.bench.run(complete(valve.values), valve.effects, driven, coarse)
-        return np.nan_to_num(self.bench.residual(results, signal))
+        residual = np.nan_to_num(self.bench.residual(results, signal))
+        if not all(np.isfinite(each).all() for each in results):
+            residual[:] = HOPELESS  # a run that blew up must not look like one that fits
+        return residual
 
     def score(
         self,
@@ -86,9 +91,10 @@ class Fitter:
     ) -> float:
         """Return the robust sum of squares of a signal over its noise, or more than `bound`."""
         self.evaluations += 1
-        return self.bench.score(
+        score = self.bench.score(
             complete(valve.values), valve.effects, signal, drive, coarse, bound
         )
+        return score if math.isfinite(score) else math.inf
 
     def fit(
         self, valve: Valve, problem: 'Problem', most: int = 20, coarse: float = COARSE

@@ -55,7 +55,8 @@ class Stretch:
         found, fallback = {}, float(self.u[0])
         for name in OUTPUTS:
             if name in self.measured:
-                fallback = float(np.nanmedian(self.measured[name][:3]))
+                known = self.measured[name][np.isfinite(self.measured[name])]
+                fallback = float(np.median(known[:3])) if known.size else fallback
             found[name] = fallback
         return found
 
