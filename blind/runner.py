@@ -36,7 +36,7 @@ def verdict(path: Path, out: Path, seed: int, without: tuple[str, ...]) -> None:
     began = time.perf_counter()
     try:
         diagnose([path], seed=seed, without=without).write(out)
-    except Exception:
+    except Exception:  # whatever a diagnosis may do wrong must not end the study; it is scored
         (out / 'error.txt').write_text(traceback.format_exc(), encoding='utf-8')
     else:
         write_json(out / 'seconds.json', time.perf_counter() - began)

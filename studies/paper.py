@@ -20,9 +20,10 @@ from valve_sim_ros.experiments.inputs import EXPERIMENTS
 from valve_sim_ros.experiments.perform import perform
 from valve_sim_ros.identification.compare import compare
 from valve_sim_ros.identification.fitness import fitness
+from valve_sim_ros.model.files import write_text
 from valve_sim_ros.model.rivals import RIVALS
 from valve_sim_ros.report.compare import overlay, signatures
-from valve_sim_ros.report.page import embed, render, write_page
+from valve_sim_ros.report.page import embed, render
 from valve_sim_ros.report.plots import save
 
 NOISE = 0.2
@@ -83,7 +84,7 @@ def main():
         save(figure, arguments.out / f'figure_{number + 1}.png')
     pictures = [(title, embed(figure)) for title, figure in figures.items()]
     html = render('paper.html', title=TITLE, blocks=blocks, pictures=pictures)
-    write_page(arguments.out / 'paper.html', html)
+    write_text(arguments.out / 'paper.html', html)
     if arguments.doc:
         arguments.doc.write_text(markdown(blocks), encoding='utf-8')
     print(markdown(blocks))

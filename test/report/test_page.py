@@ -9,6 +9,7 @@ from jinja2 import ChoiceLoader, DictLoader, UndefinedError
 from matplotlib.figure import Figure
 import pytest
 
+from valve_sim_ros.model.files import write_text
 from valve_sim_ros.report import page
 
 PAGE = """
@@ -51,7 +52,7 @@ def test_missing_value_is_an_error(toy):
         toy(name='x')
 
 
-def test_page_is_written_aside_first(tmp_path):
-    page.write_page(tmp_path / 'a.html', 'η')
+def test_file_is_written_aside_first(tmp_path):
+    write_text(tmp_path / 'a.html', 'η')
     assert (tmp_path / 'a.html').read_text(encoding='utf-8') == 'η'
     assert [path.name for path in tmp_path.iterdir()] == ['a.html']

@@ -13,8 +13,6 @@ WINDOW = 20
 """Samples of the windows in which noise is told from misfit."""
 QUIET = 0.3
 """The quietest share of the windows shows the noise."""
-LAGS = 12
-"""Lags over which noise may be coloured [samples]."""
 
 
 class Leftover(NamedTuple):
@@ -33,6 +31,12 @@ class Leftover(NamedTuple):
     def excess(self) -> float:
         """Mean square beyond the noise, over the noise."""
         return max(self.mean_square / self.floor - 1.0, 0.0)
+
+    def closed_by(self, after: 'Leftover') -> float:
+        """Part of what is beyond the noise that `after` leaves no more, 0 to 1."""
+        floor = min(self.floor, after.floor)
+        missing = max(self.mean_square - floor, 1e-9)
+        return min(max(1.0 - (after.mean_square - floor) / missing, 0.0), 1.0)
 
 
 def leftover(residual: Array) -> Leftover:
@@ -54,7 +58,7 @@ def leftover(residual: Array) -> Leftover:
 
 
 def _inflation(windows: Array) -> float:
-    """Return 1 + 2 sum of the autocorrelations inside windows, corrected for their own mean."""
+    """Return how many samples of AR(1) noise make one independent value, from windows of it."""
     centred = windows - windows.mean(axis=1, keepdims=True)
     n = windows.shape[1]
     power = float(np.mean(centred**2))

@@ -7,11 +7,13 @@ import math
 
 import numpy as np
 
+from ..identification.stretches import noise_of
 from ..model.composition import compose
 from ..model.kernels import scored
 from ..model.parameters import DELTA
 from ..model.pipeline import Array
 from ..recordings.recording import OUTPUTS, Recording
+from .errors import DiagnosisError
 from .stretch import Grid, Stretch
 
 OUTLIER = 6.0
@@ -24,19 +26,21 @@ TRAVEL, MOST_UNSETTLED = 8.0, 0.1
 """A record counts once the valve has travelled this far [%], or after this share."""
 REST = 5
 """Samples over which two means agree while the stem rests."""
-LEAST_NOISE = 0.02
-"""Smallest noise taken seriously [% of span]."""
 
 
 class Bench:
     """All stretches of all recordings, the noise of each signal, and which samples count."""
 
     def __init__(self, recordings: Sequence[Recording]) -> None:
-        """Cut the recordings into stretches and look at the noise."""
+        """Cut the recordings into stretches and look at the noise; DiagnosisError if empty."""
         self.jitter = JITTER
         self.signals = tuple(
             name for name in OUTPUTS if all(name in recording.signals for recording in recordings)
         )
+        if not self.signals:
+            raise DiagnosisError(
+                'no output is measured in all recordings: expected p1, p2 or x beside u'
+            )
         self.stretches = [
             Stretch(
                 recording.time[part] - recording.time[part][0],
@@ -47,13 +51,13 @@ class Bench:
             for part in recording.segments
             if part.stop - part.start > 20
         ]
-        self.noise = {name: self._noise(name) for name in self.signals}
+        self.noise = {
+            name: noise_of([s.measured[name] for s in self.stretches]) for name in self.signals
+        }
         for stretch in self.stretches:
             for name, values in stretch.measured.items():
                 values[_wild(values, OUTLIER * self.noise[name])] = np.nan
             stretch.noise = {n: self._uncertainty(n, v) for n, v in stretch.measured.items()}
-            if not self.signals:
-                break
             settled = np.arange(stretch.u.size) >= self._settled(stretch)
             stretch.recount({n: np.where(settled, v, np.nan) for n, v in stretch.measured.items()})
             if 'x' in self.signals:
@@ -154,10 +158,6 @@ class Bench:
             ]
         )
 
-    def joined(self, name: str) -> Array:
-        """Return u or an output over all stretches."""
-        return np.concatenate([s.u if name == 'u' else s.measured[name] for s in self.stretches])
-
     def _uncertainty(self, name: str, values: Array) -> Array:
         """Return the noise of each sample, more where the signal moves: sample times jitter."""
         steps = np.abs(np.diff(values, prepend=values[:1], append=values[-1:]))
@@ -209,15 +209,8 @@ class Bench:
     @property
     def range_of_u(self) -> tuple[float, float]:
         """Lowest and highest command [% of span]."""
-        u = self.joined('u')
+        u = np.concatenate([stretch.u for stretch in self.stretches])
         return float(u.min()), float(u.max())
-
-    def _noise(self, name: str) -> float:
-        """Return the noise of a signal [% of span] from its second differences, robustly."""
-        bends = np.concatenate([np.diff(s.measured[name], 2) for s in self.stretches])
-        bends = np.abs(bends[np.isfinite(bends)])
-        spread = float(np.median(bends)) / (0.6745 * np.sqrt(6.0)) if bends.size else 0.0
-        return max(spread, LEAST_NOISE)
 
 
 THETA = ('f_d1', 'T_g1', 'T_g2', 'f_s', 'f_d', 'a_1', 'a_2')

@@ -81,7 +81,7 @@ def diagnose(
     augmented = ladders[-1].valve
     tell(0.92, 'holding out')
     floors = {ladder.group.signal: ladder.after.floor for ladder in ladders}
-    gaps, _, _ = prove(fitter, parts, base, augmented, floors)
+    gaps = prove(fitter, parts, base, augmented, floors)
     tell(0.97, 'writing down')
     return Diagnosis(
         recordings=tuple(recordings),
@@ -121,10 +121,6 @@ def _thinned(recording: Recording, thin: int) -> Recording:
 
 def _refuse_useless(bench: Bench) -> None:
     """Refuse data that cannot tell anything."""
-    if not bench.signals:
-        raise DiagnosisError(
-            'no output is measured in all recordings: expected p1, p2 or x beside u'
-        )
     if bench.size < LEAST_SAMPLES:
         raise DiagnosisError(
             f'{bench.size} samples in stretches without gaps: expected at least {LEAST_SAMPLES}; '
@@ -178,18 +174,22 @@ def _climb_all(
             group,
             valve,
             () if unknown else group.candidates(known),
-            lambda done, share=share, width=width, text=text: tell(  # type: ignore[misc]
-                share + width * done, text
-            ),
+            _within(tell, share, width, text),
         )
         if FEEDBACK & {rung.effect for rung in ladder.rungs}:
             ladder = _settled(fitter, parts, ladder)
+        ladder = concluded(ladder)
         ladders.append(ladder)
         valve = ladder.valve
         if ladder.outcome == 'unknown_effect':
             fitter.drive = (*fitter.drive, group.signal)
     fitter.drive = ()
     return ladders, base
+
+
+def _within(tell: Progress, start: float, width: float, text: str) -> Callable[[float], object]:
+    """Return how to tell the progress of a part of the work."""
+    return lambda done: tell(start + width * done, text)
 
 
 FEEDBACK = {'positioner_loop', 'chamber_volume'}
@@ -207,7 +207,7 @@ def _settled(fitter: Fitter, parts: Sequence[Group], ladder: Ladder) -> Ladder:
             else:
                 valve = fitter.fit(valve, fitter.problem(group, valve))
     after = leftover(fitter.residuals(valve, ladder.group.signal))
-    return concluded(replace(ladder, valve=valve, after=after))
+    return replace(ladder, valve=valve, after=after)
 
 
 def _plain(

@@ -21,8 +21,7 @@ from .starts import friction_grid, grid, START
 from .unknowns import complete, EARLY, LATE, PHASE, to_point, to_values, Unknown
 
 STEM_STARTS = 6
-
-
+"""So many starts are followed where only the stem is sought."""
 HOPELESS = 1e3
 """Residual of a run that is not finite [noise]."""
 SHORT = 4
@@ -37,7 +36,7 @@ ROUNDS = ((40, 5), (10, 14), (4, 30))
 MOST_STARTS = 24
 """Up to so many starts of an effect are tried with each level of friction."""
 SCREENED, FINISHERS, REFINED = 3, 5, 2
-""" So many are refitted to the end."""
+"""How many starts of a candidate are followed, runners refitted, and refined to the end."""
 
 
 @dataclass(frozen=True)
@@ -59,7 +58,6 @@ class Fitter:
     phase: Unknown = PHASE
     drive: tuple[str, ...] = ()
     seed: int = 0
-    evaluations: int = 0
 
     def unknowns(self, group: Group) -> tuple[Unknown, ...]:
         """Return what a fit of the base valve varies in a group."""
@@ -73,7 +71,6 @@ class Fitter:
         coarse: float = COARSE,
     ) -> Array:
         """Return the residuals of a signal over its noise, 0 where they do not count."""
-        self.evaluations += 1
         driven = self.drive if drive is None else drive
         results = self.bench.run(complete(valve.values), valve.effects, driven, coarse)
         residual = np.nan_to_num(self.bench.residual(results, signal))
@@ -90,7 +87,6 @@ class Fitter:
         bound: float = math.inf,
     ) -> float:
         """Return the robust sum of squares of a signal over its noise, or more than `bound`."""
-        self.evaluations += 1
         score = self.bench.score(
             complete(valve.values), valve.effects, signal, drive, coarse, bound
         )
@@ -183,13 +179,7 @@ class Fitter:
         candidates: Sequence[Candidate],
         progress: Callable[[float], object] = lambda share: None,
     ) -> list[Valve]:
-        """Return valves with one more effect, best first, the more refitted the better they are.
-
-        Raises
-        ------
-        ValueError
-            If there are no candidates.
-        """
+        """Return valves with one more effect, best first; the better, the more refitted."""
         rugged = 'p2-x' in group.stages
         residual = self.residuals(valve, group.signal, self.drive) if rugged else np.zeros(0)
         done, total = 0, len(candidates) + FINISHERS

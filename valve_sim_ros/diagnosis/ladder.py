@@ -32,7 +32,7 @@ class Rung:
     closed : float
         Part of the excess over the noise that it removed.
     probability : float
-        Calibrated.
+        See `odds.probability`.
     twins : tuple of str
         Effects that these data do not tell from it.
     valve : Valve
@@ -77,7 +77,7 @@ def climb(
     candidates: Sequence[Candidate],
     progress: Callable[[float], object] = lambda share: None,
 ) -> Ladder:
-    """Add effects to a valve as long as the evidence asks for more.
+    """Add effects to a valve as long as the evidence asks for more; not concluded yet.
 
     Parameters
     ----------
@@ -103,7 +103,7 @@ def climb(
             group,
             now,
             candidates,
-            lambda share, step=step: progress((step + share) / MOST_EFFECTS),  # type: ignore[misc]
+            _within(progress, step),
         )
         now = fitter.rebased(group, now, runners[:5])
         if not rungs:
@@ -111,14 +111,11 @@ def climb(
             base_left = leftover(fitter.residuals(now, group.signal))
         before = leftover(fitter.residuals(now, group.signal))
         rung = judged(fitter, group, now, before, runners)
-        if (
-            rung
-            and now.candidates
-            and not odds.further(rung.gains[rung.effect], before, rung.closed)
-        ):
-            guess = guess or rung
-            break
         if rung is None:
+            break
+        alone = not now.candidates
+        if not (alone or odds.further(rung.gains[rung.effect], before, rung.closed)):
+            guess = guess or rung
             break
         if rung.closed < odds.EXPLAINED and rung.after.excess > odds.CLEAN:
             guess = rung
@@ -127,7 +124,12 @@ def climb(
         candidates = [c for c in candidates if c.effect != rung.effect]
     after = leftover(fitter.residuals(now, group.signal))
     progress(1.0)
-    return concluded(Ladder(group, 'adequate', base, now, base_left, after, tuple(rungs), guess))
+    return Ladder(group, 'adequate', base, now, base_left, after, tuple(rungs), guess)
+
+
+def _within(progress: Callable[[float], object], step: int) -> Callable[[float], object]:
+    """Return how to tell the progress of one step of the ladder."""
+    return lambda share: progress((step + share) / MOST_EFFECTS)
 
 
 def judged(
@@ -148,9 +150,7 @@ def judged(
     least_excess = odds.LEAST_EXCESS.get(group.signal, 0.0)
     if gains[candidate.effect] < odds.ENOUGH or change < least or before.excess < least_excess:
         return None
-    floor = min(before.floor, after.floor)
-    missing = max(before.mean_square - floor, 1e-9)
-    closed = min(max(1.0 - (after.mean_square - floor) / missing, 0.0), 1.0)
+    closed = before.closed_by(after)
     return Rung(
         candidate.effect,
         candidate.stage,
@@ -166,12 +166,11 @@ def judged(
 
 def concluded(ladder: Ladder) -> Ladder:
     """Return the ladder with its outcome: names only if together they explain the gap."""
-    floor = min(ladder.before.floor, ladder.after.floor)
-    missing = ladder.before.mean_square - floor
-    closed = 1.0 - (ladder.after.mean_square - floor) / missing if missing > 0.0 else 1.0
-    explained = closed >= odds.EXPLAINED or ladder.after.excess <= odds.CLEAN
-    if ladder.rungs and explained:
+    closed = ladder.before.closed_by(ladder.after)
+    if ladder.rungs and (closed >= odds.EXPLAINED or ladder.after.excess <= odds.CLEAN):
         return replace(ladder, outcome='missing_effect')
+    # what does not explain the gap is not left in the valve either
+    plain = replace(ladder, valve=ladder.base, after=ladder.before, rungs=())
     if ladder.before.excess > odds.ADEQUATE[ladder.group.signal]:
-        return replace(ladder, outcome='unknown_effect')
-    return replace(ladder, valve=ladder.base, after=ladder.before, rungs=())
+        return replace(plain, outcome='unknown_effect')
+    return plain

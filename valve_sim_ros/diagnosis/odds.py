@@ -1,6 +1,6 @@
 # Copyright 2026 The valve_sim_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""How strong evidence must be: numbers set once on the tuning half of the blind records."""
+"""How strong evidence must be: numbers set on the tuning half of the blind records."""
 
 from collections.abc import Mapping, Sequence
 import math
@@ -91,9 +91,9 @@ def close_rivals(gains: Mapping[str, float], best: str) -> list[str]:
 
 
 def probability(gains: Mapping[str, float], best: str, closed: float) -> float:
-    """Return the calibrated probability that `best` is the effect.
+    """Return the probability that `best` is the effect, from its lead and the gap it closes.
 
-    Fitted by logistic regression to the verdicts on the tuning records.
+    A logistic curve whose three numbers were chosen by hand on tuning records, not fitted.
     """
     others = [value for name, value in gains.items() if name != best]
     lead = gains[best] - max([0.0, *others])

@@ -60,7 +60,7 @@ def prove(
     base: Valve,
     augmented: Valve,
     floors: Mapping[str, float],
-) -> tuple[dict[str, Gap], Valve, Valve]:
+) -> dict[str, Gap]:
     """Fit both valves to the first part, and measure them on both parts.
 
     Parameters
@@ -78,8 +78,6 @@ def prove(
     -------
     dict of str to Gap
         By signal.
-    base, augmented : Valve
-        As fitted to the first part.
     """
     bench = fitter.bench
     counts = [dict(stretch.counts) for stretch in bench.stretches]
@@ -106,7 +104,7 @@ def prove(
             *(_halves(measured - model, held_out) for model in models),
             *(_etas(measured, model, held_out) for model in models),
         )
-    return gaps, refits[0], refits[1]
+    return gaps
 
 
 def _parts(stretches: Sequence[Stretch], total: int) -> list[Mask]:
@@ -120,7 +118,7 @@ def _parts(stretches: Sequence[Stretch], total: int) -> list[Mask]:
 
 
 def _halves(error: Array, held_out: Mask) -> Halves:
-    """Return the root mean squares of an error, outliers clipped."""
+    """Return the root mean squares of an error on both parts."""
     values = []
     for part in (error[~held_out], error[held_out]):
         known = part[np.isfinite(part)]

@@ -12,6 +12,7 @@ from typing import Any
 
 from .. import __version__
 from ..model.effects import CATALOGUE
+from ..model.files import write_text
 from ..model.parameter_file import write_parameters
 from ..model.spec import ValveSpec
 from ..recordings.recording import Recording
@@ -187,10 +188,10 @@ class Diagnosis:
         write_parameters(written[0], self.base, [*head, 'the base valve, refitted'])
         names = ', '.join(named.rung.effect for named in self.effects) or 'none'
         write_parameters(written[1], self.augmented, [*head, f'with the missing effects: {names}'])
-        _write(written[2], json.dumps(self.as_json(), indent=1) + '\n')
+        write_text(written[2], json.dumps(self.as_json(), indent=1) + '\n')
         if self.verdict != 'adequate':
             written.append(folder / 'decide_by.csv')
-            _write(written[-1], self.test_signal.csv())
+            write_text(written[-1], self.test_signal.csv())
         return written
 
     def _effect(self, named: Named) -> dict[str, Any]:
@@ -238,10 +239,3 @@ def _halves(halves: Any) -> dict[str, float | None]:
 def _finite(value: float) -> float | None:
     """Return a number that JSON knows."""
     return float(value) if math.isfinite(value) else None
-
-
-def _write(path: Path, text: str) -> None:
-    """Write a file, aside first."""
-    aside = path.with_name(f'.{path.name}.part')
-    aside.write_text(text, encoding='utf-8')
-    os.replace(aside, path)

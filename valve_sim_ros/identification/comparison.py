@@ -9,6 +9,7 @@ import os
 from pathlib import Path
 from typing import Any
 
+from ..model.files import write_text
 from ..model.rivals.declaration import Channel
 from ..recordings.recording import Recording
 from .result import Identification
@@ -137,9 +138,7 @@ class Comparison:
             'compare.txt': '\n'.join(self.lines()) + '\n',
         }
         for name, content in contents.items():
-            aside = folder / f'.{name}.part'
-            aside.write_text(content, encoding='utf-8')
-            os.replace(aside, folder / name)
+            write_text(folder / name, content)
 
 
 def percent(value: float) -> str:

@@ -70,7 +70,9 @@ class Problem:
         self.signals = _chosen(recordings, signals)
         self.stretches = stretches_of(recordings, self.signals)
         refuse_flat(self.stretches, self.signals)
-        self.noise = {name: noise_of(self.stretches, name) for name in self.signals}
+        self.noise = {
+            name: noise_of([s.measured[name] for s in self.stretches]) for name in self.signals
+        }
         steps = [s.dt[1:] for s in self.stretches]
         self.sample_time = float(np.median(np.concatenate(steps)))
         self.duration = float(sum(s.dt.sum() for s in self.stretches))

@@ -11,6 +11,7 @@ import os
 from pathlib import Path
 from typing import Any
 
+from ..model.files import write_text
 from ..model.parameter_file import write_parameters
 from ..model.pipeline import Array
 from ..model.spec import ValveSpec
@@ -141,10 +142,9 @@ class Identification:
         folder.mkdir(parents=True, exist_ok=True)
         date = datetime.now(timezone.utc).isoformat(timespec='seconds')
         content = {**self.as_json(), 'date': date}
-        aside = folder / '.identify.json.part'
-        aside.write_text(json.dumps(content, indent=2, allow_nan=False), encoding='utf-8')
+        told = json.dumps(content, indent=2, allow_nan=False)
         write_parameters(folder / 'fitted.yaml', self.spec, comments(self, date))
-        os.replace(aside, folder / 'identify.json')
+        write_text(folder / 'identify.json', told)
 
 
 def _estimate(estimate: Estimate, unit: str = '') -> dict[str, Any]:

@@ -5,12 +5,12 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-import math
 
 import numpy as np
 import numpy.typing as npt
 
 from ..model.pipeline import Array
+from ..recordings.quality import roughness
 from ..recordings.recording import Recording
 from .errors import IdentificationError
 
@@ -86,12 +86,9 @@ def _steps(time: Array) -> Array:
     return steps
 
 
-def noise_of(stretches: Sequence[Stretch], name: str) -> float:
-    """Return the noise of a signal [% of span] from its second differences, robustly."""
-    bends = np.concatenate([np.diff(s.measured[name], 2) for s in stretches])
-    bends = np.abs(bends[np.isfinite(bends)])
-    spread = float(np.median(bends)) / (0.6745 * math.sqrt(6.0)) if bends.size else 0.0
-    return max(spread, LEAST_NOISE)
+def noise_of(parts: Sequence[Array]) -> float:
+    """Return the noise of a signal in pieces [% of span], no less than anyone can tell."""
+    return max(roughness(parts), LEAST_NOISE)
 
 
 def refuse_flat(stretches: Sequence[Stretch], signals: Sequence[str]) -> None:

@@ -16,6 +16,7 @@ def borrowed(array: Any) -> Any:
     return array
 
 
+# numba calls these two with types and builders that have no annotations of their own
 @intrinsic
 def _view(typing_context, array):  # type: ignore[no-untyped-def]
     def generate(context, builder, signature, arguments):  # type: ignore[no-untyped-def]

@@ -10,6 +10,7 @@ from typing import Any
 import yaml
 
 from .errors import ModelError
+from .files import write_text
 from .parameters import BRANCH, SAMPLE_TIME
 from .spec import BASE_MODEL, EFFECTS, MODEL, ValveSpec
 
@@ -85,9 +86,7 @@ def write_parameters(
         parameters[BRANCH.name] = spec.branch
     content = {'/**': {'ros__parameters': parameters}}
     head = ''.join(f'# {line}\n' for comment in comments for line in comment.splitlines())
-    aside = path.with_name(f'.{path.name}.part')
-    aside.write_text(head + yaml.safe_dump(content, sort_keys=False), encoding='utf-8')
-    os.replace(aside, path)
+    write_text(path, head + yaml.safe_dump(content, sort_keys=False))
 
 
 def _is_node(node: Any) -> bool:

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..identification.fitness import fitness
-from ..identification.stretches import noise_of, Stretch
+from ..identification.stretches import noise_of
 from ..model.effects import CATALOGUE
 from ..model.pipeline import Array
 from ..model.simulation import InitialState, Valve
@@ -76,9 +76,15 @@ class Comparison:
             self._begin(u, measured)
         predicted = self._chain.step(u, self.sample_time)
         stages = self._stages(u, measured, predicted)
-        residual = tuple(m - s for m, s in zip(measured, stages, strict=True))
-        row = Row(self._time, u, measured, predicted, residual)  # type: ignore[arg-type]
-        self._rows[self._count % len(self._rows)] = (row.time, u, *measured, *predicted, *residual)
+        p1, p2, x = (m - s for m, s in zip(measured, stages, strict=True))
+        row = Row(self._time, u, measured, predicted, (p1, p2, x))
+        self._rows[self._count % len(self._rows)] = (
+            row.time,
+            u,
+            *measured,
+            *predicted,
+            *row.residual,
+        )
         self._count += 1
         self._time += self.sample_time
         return row
@@ -100,19 +106,20 @@ class Comparison:
         """Return the fitness of the prediction over the record, eq. (11) [%]."""
         rows = self._ordered()
         rows = rows[np.isfinite(rows[:, 5])]
-        return tuple(fitness(rows[:, 2 + k], rows[:, 5 + k]) for k in range(3))  # type: ignore[return-value]
+        p1, p2, x = (fitness(rows[:, 2 + k], rows[:, 5 + k]) for k in range(3))
+        return p1, p2, x
 
     def noise(self) -> Values:
         """Return the noise of p1, p2, x [% of span] from second differences, robustly."""
         rows = self._ordered()
-        measured = {name: rows[:, 2 + k] for k, name in enumerate(OUTPUTS)}
-        heard = [Stretch(rows[:, 1], rows[:, 0], measured, 0)]
-        return tuple(noise_of(heard, name) for name in OUTPUTS)  # type: ignore[return-value]
+        p1, p2, x = (noise_of([rows[:, 2 + k]]) for k in range(3))
+        return p1, p2, x
 
     def residual(self, seconds: float) -> Values:
         """Return the root mean square of each stage's residual over the last `seconds`."""
         rows = self._ordered()[-max(1, round(seconds / self.sample_time)) :, 8:]
-        return tuple(math.sqrt(_mean(rows[:, k] ** 2)) for k in range(3))  # type: ignore[return-value]
+        p1, p2, x = (math.sqrt(_mean(rows[:, k] ** 2)) for k in range(3))
+        return p1, p2, x
 
     def recording(self) -> Recording:
         """Return the record as it is now; RecordingError if there is too little."""

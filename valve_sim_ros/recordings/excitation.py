@@ -8,7 +8,7 @@ from itertools import pairwise
 import numpy as np
 import numpy.typing as npt
 
-from .quality import Array, resolution
+from .quality import Array, resolution, roughness
 from .recording import Recording
 
 SMALLEST_TURN = 1.0
@@ -85,12 +85,10 @@ def span(values: Array) -> Span:
     """Return what a sensor can see, of values [% of span] with NaN where lost, shape (n,)."""
     known = values[np.isfinite(values)]
     step = resolution(known)
-    bends = np.abs(np.diff(values, 2))
-    bends = bends[np.isfinite(bends)]
-    spread = float(np.median(bends)) / (0.6745 * np.sqrt(6.0)) if bends.size else 0.0
     quantum = 0.0 if np.isnan(step) else step / np.sqrt(12.0)
     low, high = float(known.min()), float(known.max())
-    return Span(low, high, float(np.hypot(spread, quantum)), step, _clipped(known, low, high))
+    noise = float(np.hypot(roughness([values]), quantum))
+    return Span(low, high, noise, step, _clipped(known, low, high))
 
 
 def _clipped(known: Array, low: float, high: float) -> float:

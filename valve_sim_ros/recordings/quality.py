@@ -218,6 +218,16 @@ def milliseconds(seconds: float) -> str:
     return f'{round(1e3 * seconds, 3) + 0.0:.3g} ms'
 
 
+def roughness(parts: Sequence[Array]) -> float:
+    """Return the noise of a signal in pieces [% of span] from its second differences, robustly.
+
+    Lost samples (NaN) do not count; without any three in a row it is 0.
+    """
+    bends = np.concatenate([np.diff(part, 2) for part in parts])
+    bends = np.abs(bends[np.isfinite(bends)])
+    return float(np.median(bends)) / (0.6745 * np.sqrt(6.0)) if bends.size else 0.0
+
+
 def resolution(values: Array) -> float:
     """Return the smallest step between two different values, NaN for a constant.
 

@@ -12,10 +12,11 @@ from matplotlib.figure import Figure
 import numpy as np
 
 from ..identification.comparison import Comparison, Entry, percent
+from ..model.files import write_text
 from ..model.pipeline import Array
 from ..model.simulation import simulate
 from ..model.spec import ValveSpec
-from .page import embed, number, render, write_page
+from .page import embed, number, render
 from .plots import FITTED, MEASURED, save
 
 COLUMNS = 3
@@ -34,7 +35,7 @@ def write_comparison(comparison: Comparison, directory: str | os.PathLike[str]) 
     pictures = {'overlay.png': overlay(comparison), 'signature.png': signatures(comparison)}
     for name, figure in pictures.items():
         save(figure, folder / name)
-    write_page(folder / 'compare.html', page(comparison, *pictures.values()))
+    write_text(folder / 'compare.html', page(comparison, *pictures.values()))
     return [*pictures, 'compare.html']
 
 

@@ -9,8 +9,9 @@ from ..diagnosis.ladder import Ladder
 from ..diagnosis.proof import Gap
 from ..diagnosis.result import Diagnosis, Named
 from ..model.effects import CATALOGUE
+from ..model.files import write_text
 from . import diagnosis_plots as plots
-from .page import embed, number, render, write_page
+from .page import embed, number, render
 
 TITLES = {
     'adequate': 'Nothing is missing',
@@ -21,7 +22,7 @@ TITLES = {
 
 def write_report(result: Diagnosis, path: str | os.PathLike[str]) -> None:
     """Write the report of a diagnosis, aside first and then renamed into place."""
-    write_page(path, report(result))
+    write_text(path, report(result))
 
 
 def report(result: Diagnosis) -> str:

@@ -6,8 +6,9 @@ import os
 
 from ..identification.result import Identification
 from ..identification.text import interval
+from ..model.files import write_text
 from . import plots
-from .page import embed, number, render, write_page
+from .page import embed, number, render
 
 MOST_RECORDINGS = 6
 """So many recordings are drawn; the numbers are of all."""
@@ -15,7 +16,7 @@ MOST_RECORDINGS = 6
 
 def write_report(result: Identification, path: str | os.PathLike[str]) -> None:
     """Write the report of an identification, aside first and then renamed into place."""
-    write_page(path, report(result))
+    write_text(path, report(result))
 
 
 def report(result: Identification) -> str:

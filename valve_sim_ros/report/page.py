@@ -6,7 +6,6 @@ import base64
 from functools import lru_cache
 import io
 import math
-import os
 from pathlib import Path
 from typing import Any
 
@@ -42,14 +41,6 @@ def embed(figure: Figure, resolution: float = RESOLUTION) -> str:
     stream = io.BytesIO()
     figure.savefig(stream, format='png', dpi=resolution)
     return 'data:image/png;base64,' + base64.b64encode(stream.getvalue()).decode('ascii')
-
-
-def write_page(path: str | os.PathLike[str], html: str) -> None:
-    """Write a page, aside first and then renamed into place."""
-    path = Path(path)
-    aside = path.with_name(f'.{path.name}.part')
-    aside.write_text(html, encoding='utf-8')
-    os.replace(aside, path)
 
 
 def number(value: float | None, digits: int = 4) -> str:
