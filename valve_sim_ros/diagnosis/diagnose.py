@@ -166,7 +166,8 @@ def _climb_all(
         share, width = 0.1 + 0.78 * index / len(parts), 0.78 / len(parts)
         text = f'looking at {group.signal}'
         tell(share, text)
-        valve = fitter.base(group, valve, fitter.drive)
+        if ladders:  # the first group was fitted just so already
+            valve = fitter.base(group, valve, fitter.drive)
         known = {*without, *valve.effects}
         unknown = any(ladder.outcome == 'unknown_effect' for ladder in ladders)
         ladder = climb(
