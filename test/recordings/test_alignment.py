@@ -68,7 +68,7 @@ def test_loss_and_jitter_misplace_no_sample_and_hardly_a_command():
 def test_commands_sent_right_at_the_samples_are_sorted_out_by_the_outputs():
     _, found, wrong = found_and_faults(0, phase=0.0, jitter=0.005)
     assert wrong == (0, 0)
-    assert found.quality.ambiguous_commands == 0
+    assert not found.quality.doubtful_commands
 
 
 def test_where_only_a_sticking_stem_answers_no_offset_is_claimed():

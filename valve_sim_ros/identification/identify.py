@@ -17,10 +17,12 @@ from .covariance import Covariance, covariance
 from .errors import IdentificationError
 from .holdout import etas, HoldOut, parts_of, remarks
 from .holdout import hold_out as fit_without
+from .placing import placed
+from .placing import remark as moved
 from .problem import Problem
 from .profiles import Profile, profile
 from .result import Identification
-from .search import polish, search
+from .search import polish, refit, search
 from .stretches import Mask
 from .uncertainty import assess, Assessment, WEAK
 from .watch import Progress, Watch
@@ -127,7 +129,10 @@ def identify(
         seed=seed,
         version=__version__,
         assessment=assessment,
-        remarks=tuple(remarks(hold_outs, assessment.estimates, _misfit(fitted))),
+        remarks=(
+            *remarks(hold_outs, assessment.estimates, _misfit(fitted)),
+            *moved(problem, fitted.problem),
+        ),
         profiles=tuple(found),
         noise=dict(problem.noise),
         bounds={u.name: (u.lower, u.upper) for u in fitted.problem.unknowns.each},
@@ -189,12 +194,15 @@ def _fit(problem: Problem, seed: int, watch: Watch) -> tuple[Covariance, Assessm
     Returns the scatter around the optimum of the problem in which a_1 is free, its assessment,
     and whether the search was stopped.
     """
-    free = problem.with_free_a_1()
     point, partial = None, False
     try:
         watch.phase(SHARES['search'], 'searching')
         point = search(problem, seed, watch).point
+        problem, stamped = placed(problem, point), problem
+        if problem is not stamped:
+            point = refit(problem, point, watch).point
         watch.phase(SHARES['ridge'], 'telling a_1 from a_2')
+        free = problem.with_free_a_1()
         released = polish(free, problem.with_a_1(point), watch).point
         scatter = covariance(free, released)
         assessment = assess(scatter, a_1_held=False)
@@ -210,7 +218,7 @@ def _fit(problem: Problem, seed: int, watch: Watch) -> tuple[Covariance, Assessm
                     'stopped before anything was found; let it run a little longer'
                 ) from None
             point = watch.best.point
-    scatter = covariance(free, problem.with_a_1(point))
+    scatter = covariance(problem.with_free_a_1(), problem.with_a_1(point))
     return scatter, assess(scatter, a_1_held=True), partial
 
 

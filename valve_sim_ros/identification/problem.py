@@ -4,6 +4,7 @@
 
 from collections.abc import Mapping, Sequence
 import copy
+from dataclasses import replace
 
 import numpy as np
 
@@ -175,6 +176,13 @@ class Problem:
         share = self.with_free_a_1().unknowns.each[-1].share(A_1_HELD)
         return np.insert(point, len(self.unknowns), share)
 
+    def with_command(self, index: int, u: Array) -> 'Problem':
+        """Return a copy in which one stretch has other commands, shape (n,)."""
+        other = copy.copy(self)
+        other.stretches = list(self.stretches)
+        other.stretches[index] = replace(self.stretches[index], u=u)
+        return other
+
     def withheld(self, counts: Sequence[Mask]) -> 'Problem':
         """Return a copy in which only some samples count: masks of shape (n,) by stretch."""
         other = copy.copy(self)
@@ -214,17 +222,17 @@ class Problem:
         given = np.zeros(3)
         if shares is not None:
             given[list(self._kinds)] = shares
-        first = stretch.first
-        p1 = first.get('p1', stretch.u[0])
-        p1 += given[0] * (self._reach('p1') if 'p1' in first else spec.values['f_d1'])
-        x = first.get('x', first.get('p2', p1)) + given[2] * self._reach('x')
-        p2 = first.get('p2', x)
-        p2 += given[1] * (self._reach('p2') if 'p2' in first else spec.values['f_s'])
-        return float(p1), float(p2), float(x)
+        first, drift = stretch.first, stretch.drift
 
-    def _reach(self, name: str) -> float:
-        """Return how far a starting value may lie from the first measured one [% of span]."""
-        return 8.0 * self.noise[name] if name in self.noise else 0.0
+        def reach(name: str, otherwise: float = 0.0) -> float:
+            if name not in first:
+                return otherwise
+            return 8.0 * self.noise[name] + drift.get(name, 0.0)
+
+        p1 = first.get('p1', stretch.u[0]) + given[0] * reach('p1', spec.values['f_d1'])
+        x = first.get('x', first.get('p2', p1)) + given[2] * reach('x')
+        p2 = first.get('p2', x) + given[1] * reach('p2', spec.values['f_s'])
+        return float(p1), float(p2), float(x)
 
     def _start_columns(
         self, point: Array, base: Array, kind: int, steps: Array, result: Array

@@ -19,6 +19,8 @@ LEAST_NOISE = 0.02
 
 Mask = npt.NDArray[np.bool_]
 
+DRIFT_SEEN = 6
+"""So many samples show how fast an output moved while those before were lost."""
 SAME_STEP = 1e-6
 """Relative difference up to which two steps of time are the same one."""
 
@@ -35,12 +37,15 @@ class Stretch:
         Outputs [% of span]; NaN where a sample was lost.
     recording : int
         Which recording it comes from.
+    doubtful : tuple of int
+        Samples with which commands begin that may as well begin one sample earlier or later.
     """
 
     u: Array
     dt: Array
     measured: dict[str, Array]
     recording: int
+    doubtful: tuple[int, ...] = ()
 
     @cached_property
     def first(self) -> dict[str, float]:
@@ -52,6 +57,18 @@ class Stretch:
                 found[name] = float(values[known[0]])
         return found
 
+    @cached_property
+    def drift(self) -> dict[str, float]:
+        """How far each output may have moved while its first samples were lost [% of span]."""
+        found = {}
+        for name, values in self.measured.items():
+            known = np.flatnonzero(np.isfinite(values))[:DRIFT_SEEN]
+            if known.size > 1 and known[0] > 0:
+                speed = np.abs(np.diff(values[known])) / np.diff(known)
+                jump = abs(values[known[0]] - self.u[0]) if name == 'p1' else 0.0
+                found[name] = float(max(2.0 * known[0] * speed.max(), jump))
+        return found
+
 
 def stretches_of(recordings: Sequence[Recording], signals: Sequence[str]) -> list[Stretch]:
     """Cut recordings at their gaps."""
@@ -61,10 +78,16 @@ def stretches_of(recordings: Sequence[Recording], signals: Sequence[str]) -> lis
             _steps(recording.time[part]),
             {name: _measured(recording, name)[part] for name in signals},
             number,
+            _inside(recording.quality.doubtful_commands, part),
         )
         for number, recording in enumerate(recordings)
         for part in recording.segments
     ]
+
+
+def _inside(rows: Sequence[int], part: slice) -> tuple[int, ...]:
+    """Return those of the rows that lie in a part, counted from its first but one."""
+    return tuple(row - part.start for row in rows if part.start < row < part.stop)
 
 
 def _measured(recording: Recording, name: str) -> Array:

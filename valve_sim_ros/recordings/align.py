@@ -252,6 +252,7 @@ def _joined(
         )
     head = int(np.argmax(known))
     start = provenance.start or 0
+    rows = commands.doubtful[commands.doubtful < time.size] - head
     first = float(np.concatenate([each.stamps for each in stretches])[head])
     return Recording(
         time=time[head:] - time[head],
@@ -270,7 +271,7 @@ def _joined(
                 if gap.start >= time[head]
             ),
             head_trimmed=head,
-            ambiguous_commands=commands.ambiguous,
+            doubtful_commands=tuple((rows[rows > 0]).tolist()),
             decided_commands=commands.decided,
             command_offset=commands.offset,
             command_offset_range=commands.offset_range,

@@ -49,15 +49,17 @@ class Hold:
         All offsets that explain the outputs equally well [s]; NaN if the data cannot tell.
     dead_samples : int
         Whole samples by which the outputs answer later still.
-    ambiguous, decided : int
-        Commands whose sample remains in doubt, and such that the outputs decided.
+    doubtful : ndarray, shape (k,)
+        Samples with which commands begin that may as well begin one sample earlier or later.
+    decided : int
+        Commands whose sample the outputs decided.
     """
 
     command: Array
     offset: float
     offset_range: tuple[float, float]
     dead_samples: int
-    ambiguous: int
+    doubtful: Index
     decided: int
 
 
@@ -117,7 +119,7 @@ def hold(
         offset,
         (spread[0] - dead * period, spread[1] - dead * period),
         dead,
-        int(doubtful.sum()),
+        rows[events[doubtful]],
         int(overruled.sum()),
     )
 

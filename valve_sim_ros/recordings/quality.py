@@ -122,8 +122,9 @@ class Quality:
         By signal, u included.
     head_trimmed : int
         Samples dropped because no command was known yet.
-    ambiguous_commands : int
-        Commands so close to a tick that their sample is in doubt.
+    doubtful_commands : tuple of int
+        Samples with which commands begin that were sent so close to a tick that they may as well
+        begin one sample earlier or later.
     decided_commands : int
         Such commands whose sample the outputs themselves decided.
     command_offset : float
@@ -145,7 +146,7 @@ class Quality:
     gaps: tuple[Gap, ...] = ()
     signals: Mapping[str, SignalQuality] = field(default_factory=dict)
     head_trimmed: int = 0
-    ambiguous_commands: int = 0
+    doubtful_commands: tuple[int, ...] = ()
     decided_commands: int = 0
     command_offset: float = float('nan')
     command_offset_range: tuple[float, float] = (float('nan'), float('nan'))
@@ -176,9 +177,9 @@ class Quality:
         if self.head_trimmed:
             lines.append(f'{self.head_trimmed} samples before the first command left out')
         lines += self._timing()
-        if self.ambiguous_commands:
+        if self.doubtful_commands:
             lines.append(
-                f'{self.ambiguous_commands} commands lie so close to a sample that they may '
+                f'{len(self.doubtful_commands)} commands lie so close to a sample that they may '
                 'belong to its neighbour'
             )
         return lines + list(self.notes)

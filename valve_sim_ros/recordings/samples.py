@@ -128,7 +128,8 @@ def _assemble(
     lost = row < 0
     held = np.maximum.accumulate(row)
     outputs = {n: np.where(lost, np.nan, columns[n][held]) for n in OUTPUTS if n in columns}
-    doubtful = int((lost[:-1] & ~lost[1:] & (np.diff(columns['u'][held]) != 0)).sum())
+    changed = np.diff(columns['u'][held]) != 0
+    doubtful = np.flatnonzero(lost[:-1] & ~lost[1:] & changed) + 1
     figures = {
         name: SignalQuality(
             messages=t.size,
@@ -151,7 +152,7 @@ def _assemble(
             regular=regular,
             gaps=tuple(gaps),
             signals=figures,
-            ambiguous_commands=doubtful,
+            doubtful_commands=tuple(doubtful.tolist()),
             notes=tuple(notes),
         ),
         max_gap=max_gap,
