@@ -11,6 +11,8 @@ from ..model.pipeline import Array
 
 WINDOW = 20
 """Samples of the windows in which noise is told from misfit."""
+LARGE = 10.0
+"""Errors beyond this are slips at other moments rather than misfit [noise]."""
 QUIET = 0.3
 """The quietest share of the windows shows the noise."""
 
@@ -18,11 +20,13 @@ QUIET = 0.3
 class Leftover(NamedTuple):
     """What a model leaves of a signal, in multiples of the noise seen from sample to sample.
 
-    mean_square of the whole, that of the noise alone, the number of samples that count, and how
-    many of them make one independent value (coloured noise).
+    mean_square of the whole, single errors beyond LARGE growing linearly; the same with those
+    cut off at LARGE; that of the noise alone, the number of samples that count, and how many of
+    them make one independent value (coloured noise).
     """
 
     mean_square: float
+    cut: float
     floor: float
     samples: int
     inflation: float
@@ -30,7 +34,7 @@ class Leftover(NamedTuple):
     @property
     def excess(self) -> float:
         """Mean square beyond the noise, over the noise."""
-        return max(self.mean_square / self.floor - 1.0, 0.0)
+        return max(self.cut / self.floor - 1.0, 0.0)
 
     def closed_by(self, after: 'Leftover') -> float:
         """Part of what is beyond the noise that `after` leaves no more, 0 to 1."""
@@ -43,7 +47,8 @@ def leftover(residual: Array) -> Leftover:
     """Look at the residual of a signal over its noise, shape (n,), 0 or NaN where not counted."""
     values = residual[np.isfinite(residual) & (residual != 0.0)]
     if values.size < 4 * WINDOW:
-        return Leftover(float(np.mean(values**2)) if values.size else 0.0, 1.0, values.size, 1.0)
+        total = float(np.mean(values**2)) if values.size else 0.0
+        return Leftover(total, total, 1.0, values.size, 1.0)
     windows = values[: values.size // WINDOW * WINDOW].reshape(-1, WINDOW)
     centred = windows - windows.mean(axis=1, keepdims=True)
     variances = centred.var(axis=1, ddof=1)
@@ -51,9 +56,14 @@ def leftover(residual: Array) -> Leftover:
     floor = float(np.quantile(variances, QUIET)) / expected
     quiet = windows[variances <= np.quantile(variances, 0.6)]
     inflation = _inflation(quiet)
-    clipped = np.clip(values, -10.0, 10.0)
+    sizes = np.abs(values)
+    cut = np.minimum(sizes, LARGE)
     return Leftover(
-        float(np.mean(clipped**2)), max(floor * inflation**0.5, 0.3), values.size, inflation
+        float(np.mean(cut * (2.0 * sizes - cut))),
+        float(np.mean(cut**2)),
+        max(floor * inflation**0.5, 0.3),
+        values.size,
+        inflation,
     )
 
 
@@ -61,7 +71,7 @@ def _inflation(windows: Array) -> float:
     """Return how many samples of AR(1) noise make one independent value, from windows of it."""
     centred = windows - windows.mean(axis=1, keepdims=True)
     n = windows.shape[1]
-    power = float(np.mean(centred**2))
+    power = max(float(np.mean(centred**2)), 1e-12)
     first = float(np.mean(centred[:, 1:] * centred[:, :-1])) / power + 1.0 / n
     colour = min(max(first, 0.0), 0.9)
     return (1.0 + colour) / (1.0 - colour)

@@ -20,8 +20,10 @@ OUTLIER = 6.0
 """A single value further than this from both its neighbours is an outlier [noise]."""
 JITTER = 0.1
 """Uncertainty of when a sample was taken, as a share of the period."""
-MIXED, MIXED_JITTER = 0.06, 0.7
-"""Share of late commands from which arrivals are mixed, and the uncertainty that follows."""
+MIXED, LEAST_MIXED, MIXED_JITTER = 0.02, 3, 0.7
+"""Share and number of late commands from which arrivals are mixed; the uncertainty then."""
+LEAST_AT_REST = 0.3
+"""Share of the samples of p1 that counts even so."""
 TRAVEL, MOST_UNSETTLED = 8.0, 0.1
 """A record counts once the valve has travelled this far [%], or after this share."""
 REST = 5
@@ -169,8 +171,8 @@ class Bench:
     def mixed_arrivals(self, results: Sequence[Array]) -> bool:
         """Tell whether some samples of p1 show a command and others not yet, as if by chance.
 
-        That is so where samples are taken just when commands arrive, and jitter. Samples of a
-        changing command then tell little: they are weighed down.
+        That is so where samples are taken just when commands arrive, and jitter; then see
+        `weigh_down`.
 
         Parameters
         ----------
@@ -181,17 +183,33 @@ class Bench:
         for stretch, result in zip(self.stretches, results, strict=True):
             now, before = result[0, 1:], result[0, :-1]
             seen, noise = stretch.counts['p1'][1:], self.noise['p1']
-            told = np.abs(now - before) > 8.0 * noise
+            told = self._steps(result)[1:] > 8.0 * noise
             late += int(np.sum(told & (np.abs(seen - before) < 3.0 * noise)))
             on_time += int(np.sum(told & (np.abs(seen - now) < 3.0 * noise)))
-        return min(late, on_time) > MIXED * (late + on_time)
+        return min(late, on_time) >= max(MIXED * (late + on_time), LEAST_MIXED)
 
-    def weigh_down(self, jitter: float) -> None:
-        """Let sample times be uncertain by this share of a period."""
+    def weigh_down(self, jitter: float, results: Sequence[Array]) -> None:
+        """Let sample times be uncertain by this share of a period.
+
+        The samples of p1 at which the `results` of the base valve change do not count any more,
+        if enough others are left.
+        """
         self.jitter = jitter
-        for stretch in self.stretches:
+        steps = np.concatenate([self._steps(result) for result in results])
+        limit = max(self.noise['p1'], float(np.quantile(steps, LEAST_AT_REST)))
+        for stretch, result in zip(self.stretches, results, strict=True):
             stretch.noise = {n: self._uncertainty(n, v) for n, v in stretch.measured.items()}
-            stretch.recount(stretch.counts)
+            p1 = np.where(self._steps(result) > limit, np.nan, stretch.counts['p1'])
+            stretch.recount({**stretch.counts, 'p1': p1})
+
+    @property
+    def mixed(self) -> bool:
+        """Whether it is unknown, sample by sample, which command p1 answers."""
+        return self.jitter > JITTER
+
+    def _steps(self, result: Array) -> Array:
+        """Return how far p1 moves up to each sample of a result [%], shape (n,)."""
+        return np.abs(np.diff(result[0], prepend=result[0, :1]))
 
     def _settled(self, stretch: Stretch) -> int:
         """Return the first sample by which the unknown state before the record is forgotten.

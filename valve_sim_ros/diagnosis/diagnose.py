@@ -10,6 +10,7 @@ import os
 from ..model.spec import ValveSpec
 from ..recordings import read_recording
 from ..recordings.recording import OUTPUTS, Recording
+from . import odds
 from .adequacy import leftover
 from .bench import Bench
 from .conditions import Place, places
@@ -170,6 +171,9 @@ def _climb_all(
             valve = fitter.base(group, valve, fitter.drive)
         known = {*without, *valve.effects}
         unknown = any(ladder.outcome == 'unknown_effect' for ladder in ladders)
+        drive = fitter.drive
+        # stages to which later ones feed back are given what was measured of these
+        fitter.drive = (*drive, *fitter.bench.signals[index + 1 :])
         ladder = climb(
             fitter,
             group,
@@ -177,12 +181,16 @@ def _climb_all(
             () if unknown else group.candidates(known),
             _within(tell, share, width, text),
         )
+        fitter.drive = drive
         if FEEDBACK & {rung.effect for rung in ladder.rungs}:
             ladder = _settled(fitter, parts, ladder)
         ladder = concluded(ladder)
         ladders.append(ladder)
         valve = ladder.valve
-        if ladder.outcome == 'unknown_effect':
+        inexact = group.signal == 'p1' and ladder.after.excess > odds.CLEAN
+        if ladder.outcome == 'unknown_effect' or inexact:
+            # what is wrong here must not be blamed on the stages that follow; a stem that is
+            # driven by a noisy p2 would slip at other moments
             fitter.drive = (*fitter.drive, group.signal)
     fitter.drive = ()
     return ladders, base
@@ -208,6 +216,8 @@ def _settled(fitter: Fitter, parts: Sequence[Group], ladder: Ladder) -> Ladder:
             else:
                 valve = fitter.fit(valve, fitter.problem(group, valve))
     after = leftover(fitter.residuals(valve, ladder.group.signal))
+    if after.excess > ladder.after.excess:
+        return ladder
     return replace(ladder, valve=valve, after=after)
 
 

@@ -266,15 +266,18 @@ class Fitter:
     def _settle_phase(self, group: Group, valve: Valve) -> None:
         """Find out whether p1 answers at the sample that shows the command or at the next."""
         best = []
-        problem = (self.unknowns(group), group.signal, group.drive)
         for phase in (EARLY, LATE):
+            self.phase = phase
+            problem = (self.unknowns(group), group.signal, group.drive)
             values = {**valve.values, 'phase': min(phase.upper, 0.0)}
             starts = [{**values, **there} for there in grid(problem[0])]
             best.append(self._best_of(valve, starts, problem, 1)[0])
         self.phase = EARLY if best[0].cost <= best[1].cost else LATE
         values = {**best[0].values, 'phase': 0.0}
-        if self.bench.mixed_arrivals(self.bench.run(complete(values), best[0].effects)):
-            self.bench.weigh_down(MIXED_JITTER)
+        results = self.bench.run(complete(values), best[0].effects)
+        if self.bench.mixed_arrivals(results):
+            self.bench.weigh_down(MIXED_JITTER, results)
+            self.phase = PHASE
 
     def _best_of(
         self,

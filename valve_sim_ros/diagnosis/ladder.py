@@ -8,11 +8,14 @@ from typing import Literal
 
 from . import odds
 from .adequacy import Leftover, leftover
-from .fitting import Fitter, Valve
+from .fitting import COARSE, Fitter, Valve
 from .stages import Candidate, Group
 
 MOST_EFFECTS = 2
 """Most effects named in one group of stages."""
+
+RECONSIDERED = 5
+"""So many rivals of the first effect are tried again beside the second."""
 
 Outcome = Literal['adequate', 'missing_effect', 'unknown_effect']
 
@@ -93,7 +96,7 @@ def climb(
         Called with the share done.
     """
     before = base_left = leftover(fitter.residuals(valve, group.signal))
-    base = now = valve
+    base = now = replace(valve, cost=fitter.score(valve, group.signal, fitter.drive, COARSE))
     rungs: list[Rung] = []
     guess = None
     for step in range(MOST_EFFECTS):
@@ -113,11 +116,14 @@ def climb(
         rung = judged(fitter, group, now, before, runners)
         if rung is None:
             break
-        alone = not now.candidates
-        if not (alone or odds.further(rung.gains[rung.effect], before, rung.closed)):
-            guess = guess or rung
-            break
-        if rung.closed < odds.EXPLAINED and rung.after.excess > odds.CLEAN:
+        if rungs:
+            enough = odds.further(rung.gains[rung.effect], before)
+            both = reconsidered(fitter, group, base, [*rungs, rung]) if enough else rungs
+            if not enough or not odds.needed(base_left, before, rung.closed, both[-1].after):
+                guess = guess or rung
+                break
+            rungs, rung = both[:-1], both[-1]
+        elif rung.closed < odds.EXPLAINED and rung.after.excess > odds.CLEAN:
             guess = rung
         rungs.append(rung)
         now, before = rung.valve, rung.after
@@ -125,6 +131,42 @@ def climb(
     after = leftover(fitter.residuals(now, group.signal))
     progress(1.0)
     return Ladder(group, 'adequate', base, now, base_left, after, tuple(rungs), guess)
+
+
+def reconsidered(fitter: Fitter, group: Group, base: Valve, rungs: Sequence[Rung]) -> list[Rung]:
+    """Return the rungs with the first name chosen anew beside the second.
+
+    Alone, an effect may have been named because it made up for part of another one.
+    """
+    first, second = rungs[0], rungs[1]
+    added = second.valve.candidates[-1]
+    near = sorted(first.gains, key=lambda name: -first.gains[name])[:RECONSIDERED]
+    candidates = [
+        candidate
+        for candidate in group.candidates({*base.effects, second.effect})
+        if candidate.effect in near
+    ]
+    own = first.valve.candidates[-1]
+    alone = fitter.fit(
+        replace(
+            second.valve,
+            values={**second.valve.values, **own.neutral},
+            effects=tuple(name for name in second.valve.effects if name != first.effect),
+            freed=(*base.freed, *added.unknowns),
+            candidates=(*base.candidates, added),
+        ),
+        fitter.problem(group, base),
+    )
+    before = leftover(fitter.residuals(alone, group.signal))
+    found = judged(fitter, group, alone, before, fitter.race(group, alone, candidates))
+    if found is None:
+        return list(rungs)
+    worse = 0.5 * (found.valve.cost - second.valve.cost) / found.after.inflation
+    if worse > odds.twin_limit(found.gains[found.effect]):
+        return list(rungs)
+    if found.effect == first.effect and worse > 0.0:
+        found = replace(found, valve=second.valve, after=second.after)
+    return [found, replace(second, after=found.after, valve=found.valve)]
 
 
 def _within(progress: Callable[[float], object], step: int) -> Callable[[float], object]:
@@ -147,7 +189,7 @@ def judged(
     after = leftover(fitter.residuals(best, group.signal))
     change = before.mean_square - after.mean_square
     least = odds.LEAST_SHIFT if candidate.effect in odds.LASTING else odds.LEAST_CHANGE
-    least_excess = odds.LEAST_EXCESS.get(group.signal, 0.0)
+    least_excess = (odds.LEAST_IF_MIXED if fitter.bench.mixed else odds.LEAST_EXCESS)[group.signal]
     if gains[candidate.effect] < odds.ENOUGH or change < least or before.excess < least_excess:
         return None
     closed = before.closed_by(after)
@@ -167,7 +209,8 @@ def judged(
 def concluded(ladder: Ladder) -> Ladder:
     """Return the ladder with its outcome: names only if together they explain the gap."""
     closed = ladder.before.closed_by(ladder.after)
-    if ladder.rungs and (closed >= odds.EXPLAINED or ladder.after.excess <= odds.CLEAN):
+    clean = ladder.after.excess <= odds.CLEAN and closed >= odds.LEAST_CLOSED
+    if ladder.rungs and (closed >= odds.EXPLAINED or clean):
         return replace(ladder, outcome='missing_effect')
     # what does not explain the gap is not left in the valve either
     plain = replace(ladder, valve=ladder.base, after=ladder.before, rungs=())

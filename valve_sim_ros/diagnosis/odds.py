@@ -14,6 +14,9 @@ ENOUGH = 25.0
 """Least gain in half log-likelihoods of independent samples for any name."""
 MORE_ENOUGH, MORE_EXCESS, MORE_CLOSED = 60.0, 0.25, 0.6
 """What a further effect needs: gain, excess before it, and the part of it that it closes."""
+MORE_SHARE, FAR_OFF = 0.02, 2.0
+"""Least part of the whole gap that it closes; the excess from which it may close less of what is
+left, if both together explain the gap."""
 LASTING = (
     'ip_calibration',
     'ip_nonlinearity',
@@ -28,15 +31,17 @@ LASTING = (
 """Effects that shift a signal for long: small ones are nothing but the bias of a fit."""
 LEAST_SHIFT, LEAST_CHANGE = 0.2, 0.015
 """Least mean square that such an effect, and any other, must remove [noise]."""
-LEAST_EXCESS = {'p2': 0.5}
-"""Least excess before a name in this signal: where samples are taken just as commands arrive,
-the start of each move of p2 scatters by up to a sample, and late chambers fit that a little."""
+LEAST_EXCESS = {'p1': 0.0, 'p2': 0.5, 'x': 0.0}
+LEAST_IF_MIXED = {'p1': 0.3, 'p2': 0.5, 'x': 0.0}
+"""Least excess before a name in a signal, and where commands arrive just as samples are taken: the
+start of each move then scatters by up to a sample, and lags fit that a little."""
 ADEQUATE = {'p1': 0.8, 'p2': 1.2, 'x': 0.8}
 """Excess over the noise that still counts as adequate (other solvers, jitter)."""
 CLEAN = 0.25
 """Excess that counts as noise once an effect is added."""
-EXPLAINED = 0.85
-"""Least part of the excess that a name must close, else the effect is unknown."""
+EXPLAINED, LEAST_CLOSED = 0.85, 0.5
+"""Least part of the excess that a name must close, else the effect is unknown; and where nothing
+but noise is left."""
 TWIN_GAIN, TWIN_SHARE, KNOWN_TWIN_SHARE = 12.0, 0.003, 0.02
 """Rivals whose gain is less than this, or this share of the gain, behind cannot be excluded; those
 that are declared to look alike need not come as close."""
@@ -56,9 +61,14 @@ def gain(before: float, after: Valve, inflation: float, count: int) -> float:
 def choice(runners: Sequence[Valve], gains: Mapping[str, float]) -> Valve:
     """Return the best runner; of those the data do not tell apart, the most plausible."""
     best = max(gains.values())
-    limit = max(TWIN_GAIN, TWIN_SHARE * best)
+    limit = twin_limit(best)
     close = [each for each in runners if best - gains[each.candidates[-1].effect] < limit]
     return min(close, key=lambda each: (surprise(each), -gains[each.candidates[-1].effect]))
+
+
+def twin_limit(gained: float, share: float = TWIN_SHARE) -> float:
+    """Return by how much a gain must lead for the data to tell two effects apart."""
+    return max(TWIN_GAIN, share * gained)
 
 
 def surprise(valve: Valve) -> int:
@@ -74,9 +84,17 @@ def surprise(valve: Valve) -> int:
     return odd
 
 
-def further(gained: float, before: Leftover, closed: float) -> bool:
+def further(gained: float, before: Leftover) -> bool:
     """Tell whether there is evidence for one effect more than those already found."""
-    return gained >= MORE_ENOUGH and before.excess >= MORE_EXCESS and closed >= MORE_CLOSED
+    return gained >= MORE_ENOUGH and before.excess >= MORE_EXCESS
+
+
+def needed(base: Leftover, before: Leftover, closed: float, after: Leftover) -> bool:
+    """Tell whether a further effect closes enough of the gap, `after` being both together."""
+    share = base.closed_by(after) - base.closed_by(before)
+    left = base.closed_by(before) < EXPLAINED or before.excess > FAR_OFF
+    explained = left and base.closed_by(after) >= EXPLAINED
+    return share >= MORE_SHARE and (closed >= MORE_CLOSED or explained)
 
 
 def close_rivals(gains: Mapping[str, float], best: str) -> list[str]:
@@ -84,7 +102,7 @@ def close_rivals(gains: Mapping[str, float], best: str) -> list[str]:
 
     def limit(name: str) -> float:
         known = name in CATALOGUE[best].twins or best in CATALOGUE[name].twins
-        return max(TWIN_GAIN, (KNOWN_TWIN_SHARE if known else TWIN_SHARE) * gains[best])
+        return twin_limit(gains[best], KNOWN_TWIN_SHARE if known else TWIN_SHARE)
 
     near = [name for name in gains if name != best and gains[best] - gains[name] < limit(name)]
     return sorted(near, key=lambda name: -gains[name])

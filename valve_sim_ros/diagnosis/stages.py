@@ -78,7 +78,8 @@ class Group:
     def unknowns(self, stretches: int, phase: Unknown = PHASE) -> tuple[Unknown, ...]:
         """Return what a fit of the base valve varies here."""
         base = [unknown for stage in self.stages for unknown in BASE_UNKNOWNS[stage]]
-        if self.stages != ('u-p1',) and not (len(self.stages) == 1 and self.signal == 'x'):
+        # p1 alone shows only whether a command came before the sample
+        if self.stages != ('p2-x',) and not (self.stages == ('u-p1',) and phase.lower < 0.0):
             base.append(phase)
         hidden = [
             name

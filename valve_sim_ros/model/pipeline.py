@@ -72,7 +72,8 @@ class Lag(NamedTuple):
 class Motion(NamedTuple):
     """The stem and the pressure p2 [% of span] after a step, and what drove them.
 
-    The opening force was target + excess exp(-rate tau) [% of span].
+    The opening force was target + excess exp(-rate tau) [% of span]; theta are the valve's
+    parameters.
     """
 
     stem: Stem
@@ -81,6 +82,14 @@ class Motion(NamedTuple):
     excess: float
     rate: float
     friction: Friction
+    theta: Theta
+
+
+@njit(forceinline=True)
+def moved(motion: Motion, stem: Stem, p2: float) -> Motion:
+    """Return the motion with another stem and pressure p2 [% of span] after the step."""
+    m = motion
+    return Motion(stem, p2, m.target, m.excess, m.rate, m.friction, m.theta)
 
 
 class Transition(NamedTuple):
@@ -219,7 +228,7 @@ def advance(
         phi2,
     )
     p2 = chamber_pressure(state.p2, target, lag.decay)
-    motion = Motion(stem, p2, target + offset, excess, rate, friction)
+    motion = Motion(stem, p2, target + offset, excess, rate, friction, theta)
     stem, p2 = motion_slot(motion, state, effects, memory, dt)[:2]
     armed = 1.0 if stem.armed else 0.0
     time = state.time + dt

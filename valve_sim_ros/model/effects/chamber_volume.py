@@ -7,7 +7,7 @@ from typing import Any
 from numba import njit
 
 from ..declarations import Effect, EffectParameter
-from ..pipeline import Motion
+from ..pipeline import Motion, moved
 
 ABSOLUTE = 150.0
 """Absolute pressure at p2 = 0 [% of span]: 1.2 bar where the span is 0.2 to 1.0 bar."""
@@ -27,14 +27,7 @@ def motion(value: Any, state: Any, p: Any, memory: Any, dt: float) -> Motion:
     before = max(1.0 + ratio * state.x / 100.0, 0.05)
     after = max(1.0 + ratio * value.stem.x / 100.0, 0.05)
     change = (value.p2 + ABSOLUTE) * (before / after - 1.0)
-    return Motion(
-        value.stem,
-        value.p2 + displacement * change,
-        value.target,
-        value.excess,
-        value.rate,
-        value.friction,
-    )
+    return moved(value, value.stem, value.p2 + displacement * change)
 
 
 EFFECT = Effect(

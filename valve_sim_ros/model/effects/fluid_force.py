@@ -13,11 +13,18 @@ from ..stem import Friction
 
 @njit
 def force(value: Any, state: Any, p: Any, memory: Any, dt: float) -> tuple[float, Friction]:
-    """Return the tangent at x of a closing force F exp(-x / w)."""
+    """Return the tangent at x of a closing force F (1 - q x / w)^(1 / q), q = 0: F exp(-x / w)."""
     offset, f = value
-    strength, reach = p
-    here = strength * math.exp(-max(state.x, 0.0) / reach)
-    stiffness = max(f.stiffness - here / reach, 0.05)
+    strength, reach, shape = p
+    opening = max(state.x, 0.0) / reach
+    if shape < 1e-3:
+        here = strength * math.exp(-opening)
+        fall = here / reach
+    else:
+        rest = max(1.0 - shape * opening, 1e-9)
+        fall = strength / reach * rest ** (1.0 / shape - 1.0)
+        here = fall * reach * rest
+    stiffness = max(f.stiffness - fall, 0.05)
     tangent = stiffness - f.stiffness
     return offset - here + tangent * state.x, Friction(
         f.static_up, f.static_down, f.dynamic_up, f.dynamic_down, stiffness
@@ -49,9 +56,21 @@ EFFECT = Effect(
             3.0,
             200.0,
             'log',
-            'Opening over which it falls to 37 %',
+            'Opening over which it would fall to 0 at its first rate',
             neutral=30.0,
             starts=(20.0,),
+        ),
+        EffectParameter(
+            'shape',
+            'q',
+            '-',
+            0.0,
+            0.0,
+            1.0,
+            'linear',
+            'How it falls: 0 exponentially, 1/2 as a parabola, 1 linearly',
+            starts=(0.0,),
+            step=0.05,
         ),
     ),
     slots={'force_slot': force},

@@ -8,7 +8,7 @@ from typing import Any
 from numba import njit
 
 from ..declarations import Effect, EffectParameter
-from ..pipeline import Motion
+from ..pipeline import Motion, moved
 from ..stem import Stem
 
 DROP = 1.0
@@ -38,7 +38,7 @@ def motion(value: Any, state: Any, p: Any, memory: Any, dt: float) -> Motion:
     v = push / (1.0 + dt * INERTIA * brake)
     memory[0] = alpha * (z + dt * v)
     stem = Stem(x + dt * v, v, 0.0, False)
-    return Motion(stem, value.p2, value.target, value.excess, value.rate, f)
+    return moved(value, stem, value.p2)
 
 
 EFFECT = Effect(

@@ -8,7 +8,7 @@ from typing import Any
 from numba import njit
 
 from ..declarations import Effect, EffectParameter
-from ..pipeline import Motion
+from ..pipeline import Motion, moved
 from ..stem import Stem
 
 UNLIMITED = 1000.0
@@ -37,7 +37,7 @@ def motion(value: Any, state: Any, p: Any, memory: Any, dt: float) -> Motion:
         return value
     v = min(max(stem.v, -closing), opening)
     limited = Stem(x, v, stem.direction, stem.armed)
-    return Motion(limited, value.p2, value.target, value.excess, value.rate, value.friction)
+    return moved(value, limited, value.p2)
 
 
 EFFECT = Effect(

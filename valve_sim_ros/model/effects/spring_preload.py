@@ -7,7 +7,7 @@ from typing import Any
 from numba import njit
 
 from ..declarations import Effect, EffectParameter
-from ..pipeline import Motion
+from ..pipeline import Motion, moved
 from ..stem import Friction, Stem
 
 
@@ -25,7 +25,7 @@ def motion(value: Any, state: Any, p: Any, memory: Any, dt: float) -> Motion:
     if stem.x >= 0.0:
         return value
     seated = Stem(0.0, 0.0, 0.0, False)
-    return Motion(seated, value.p2, value.target, value.excess, value.rate, value.friction)
+    return moved(value, seated, value.p2)
 
 
 EFFECT = Effect(

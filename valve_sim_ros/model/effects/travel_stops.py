@@ -7,7 +7,7 @@ from typing import Any
 from numba import njit
 
 from ..declarations import Effect, EffectParameter
-from ..pipeline import Motion
+from ..pipeline import Motion, moved
 from ..stem import Stem
 
 FAR = 60.0
@@ -21,7 +21,7 @@ def motion(value: Any, state: Any, p: Any, memory: Any, dt: float) -> Motion:
     if x == stem.x:
         return value
     stopped = Stem(x, 0.0, 0.0, False)
-    return Motion(stopped, value.p2, value.target, value.excess, value.rate, value.friction)
+    return moved(value, stopped, value.p2)
 
 
 EFFECT = Effect(
