@@ -9,7 +9,8 @@ import pytest
 from scipy.signal import lfilter
 
 from valve_sim_ros import simulate
-from valve_sim_ros.diagnosis.adequacy import leftover
+from valve_sim_ros.diagnosis import odds
+from valve_sim_ros.diagnosis.adequacy import Leftover, leftover
 from valve_sim_ros.diagnosis.bench import Bench
 from valve_sim_ros.diagnosis.conditions import places
 from valve_sim_ros.diagnosis.decision import TestSignal
@@ -92,6 +93,22 @@ def test_a_misfit_in_a_tenth_of_the_time_is_an_excess():
     misfit = np.where(np.arange(5000) % 1000 < 100, 4.0, 0.0)
     left = leftover(rng.standard_normal(5000) + misfit)
     assert left.excess == pytest.approx(1.6, abs=0.4)
+
+
+def test_errors_of_any_size_can_be_compared():
+    rng = np.random.default_rng(2)
+    noise, misfit = rng.standard_normal(5000), np.linspace(-400.0, 400.0, 5000)
+    far, near = leftover(noise + misfit), leftover(noise + 0.1 * misfit)
+    assert far.closed_by(near) > 0.85
+    assert near.closed_by(far) == 0.0
+
+
+def test_a_further_effect_must_close_part_of_the_whole_gap():
+    base, far, near, clean = (Leftover(1.0 + e, 1.0 + e, 1.0, 5000, 1.0) for e in (50, 10, 1, 0))
+    assert odds.needed(base, far, 1.0, clean)
+    assert odds.needed(base, far, 0.3, near)  # much is left, and both together explain it
+    assert not odds.needed(base, near, 0.3, clean)  # enough is explained without it
+    assert not odds.needed(base, near, 0.9, Leftover(1.5, 1.5, 1.0, 5000, 1.0))
 
 
 def test_the_place_of_a_misfit_is_found():
