@@ -19,6 +19,7 @@ from valve_sim_ros import (
 )
 from valve_sim_ros.cli import main
 from valve_sim_ros.identification.fitness import fitness
+from valve_sim_ros.identification.problem import Problem
 
 TRUTH = {'f_d1': 2.5, 'T_g1': 5.0, 'T_g2': 20.0, 'f_s': 7.0, 'f_d': 3.0}
 
@@ -114,3 +115,16 @@ def test_bad_parameter_files(tmp_path, text, words):
     (tmp_path / 'p.yaml').write_text(text)
     with pytest.raises(ModelError, match=words):
         read_parameters(tmp_path / 'p.yaml')
+
+
+def test_long_data_are_searched_in_part_and_fitted_whole(monkeypatch):
+    monkeypatch.setattr('valve_sim_ros.identification.identify.MOST_SEARCHED', 700)
+    data = record(0.1)
+    problem = Problem([data])
+    part = problem.shortened(700)
+    assert [stretch.u.size for stretch in part.stretches] == [700]
+    assert problem.shortened(10**6) is problem
+    result = identify(data, hold_out=False)
+    assert result.fitted[0]['x'].size == len(data)
+    for name, true in TRUTH.items():
+        assert result.spec.values[name] == pytest.approx(true, rel=0.02), name

@@ -95,6 +95,7 @@ def covariance(problem: Problem, point: Array) -> Covariance:
     jacobian = problem.jacobian(point, residuals, STEP)
     bread = np.linalg.inv(jacobian.T @ jacobian / variance + own)
     for _ in range(ROUNDS):
+        del jacobian  # the next one needs as much memory
         jacobian = _secants(problem, point, bread)
         information = jacobian.T @ jacobian / variance
         bread = np.linalg.inv(information + own)
@@ -111,10 +112,13 @@ def _secants(problem: Problem, point: Array, matrix: Array) -> Array:
     sizes, axes = np.linalg.eigh(matrix)
     steps = axes * np.sqrt(np.maximum(sizes, LEAST_STEP**2))
     steps *= np.minimum(1.0, MOST_STEP / np.abs(steps).max(axis=0))
-    changes = np.empty((problem.residuals(point).size, point.size))
+    changes = np.empty((problem.blocks[-1][1].stop, point.size), order='F')
     moves = np.empty_like(steps)
     for index, step in enumerate(steps.T):
         ahead, behind = np.clip(point + step, 0.0, 1.0), np.clip(point - step, 0.0, 1.0)
         moves[:, index] = ahead - behind
         changes[:, index] = problem.residuals(ahead) - problem.residuals(behind)
-    return np.asarray(changes @ np.linalg.inv(moves))
+    turn = np.linalg.inv(moves)
+    for _, rows in problem.blocks:
+        changes[rows] = changes[rows] @ turn
+    return changes

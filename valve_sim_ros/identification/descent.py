@@ -59,6 +59,7 @@ def descend(
     for _ in range(most_steps):
         jacobian = differentiate(point, residuals, step)
         normal, gradient = jacobian.T @ jacobian, jacobian.T @ residuals
+        del jacobian  # the next one needs as much memory
         before = cost
         while damping < MOST_DAMPING:
             trial = np.clip(point + _direction(normal, gradient, damping, point), 0.0, 1.0)

@@ -31,6 +31,8 @@ FEWEST_SAMPLES = 10
 SHARES = {'search': 0.7, 'ridge': 0.75, 'hold-out': 0.9, 'profiles': 1.0}
 """Share of the work that is done after each phase."""
 
+MOST_SEARCHED = 50_000
+"""Samples that are searched: a search keeps many sets of residuals, and takes its time."""
 SAME = 0.1
 """Loss of log-likelihood, doubled, that an unseen parameter's usual value may cost."""
 
@@ -197,7 +199,7 @@ def _fit(problem: Problem, seed: int, watch: Watch) -> tuple[Covariance, Assessm
     point, partial = None, False
     try:
         watch.phase(SHARES['search'], 'searching')
-        point = search(problem, seed, watch).point
+        point = _searched(problem, seed, watch)
         problem, stamped = placed(problem, point), problem
         if problem is not stamped:
             point = refit(problem, point, watch).point
@@ -220,6 +222,15 @@ def _fit(problem: Problem, seed: int, watch: Watch) -> tuple[Covariance, Assessm
             point = watch.best.point
     scatter = covariance(problem.with_free_a_1(), problem.with_a_1(point))
     return scatter, assess(scatter, a_1_held=True), partial
+
+
+def _searched(problem: Problem, seed: int, watch: Watch) -> Array:
+    """Return the optimum; of long data only the first part is searched, then all is fitted."""
+    part = problem.shortened(MOST_SEARCHED)
+    point = search(part, seed, watch).point
+    if part is problem:
+        return point
+    return refit(problem, problem.point(part.values(point)), watch).point
 
 
 def _misfit(fitted: Covariance) -> float:

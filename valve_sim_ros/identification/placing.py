@@ -24,12 +24,22 @@ def placed(problem: Problem, point: Array) -> Problem:
     point : ndarray, shape (size,)
         The valve: the optimum for the commands as they are.
     """
+    if not any(stretch.doubtful for stretch in problem.stretches):
+        return problem
     speaks = _speaking(problem)
     residuals = problem.residuals(point)
     # a valve fitted to misplaced commands leans towards them: what it could make up for by
     # other parameters does not count
-    lean = np.linalg.qr(problem.jacobian(point, residuals)[speaks])[0]
-    cost = _beyond(residuals[speaks], lean)
+    lean = problem.jacobian(point, residuals)
+    lean[~speaks] = 0.0
+    weight = np.linalg.pinv(lean.T @ lean, rcond=1e-12, hermitian=True)
+
+    def beyond(values: Array) -> float:
+        """Return the sum of squares that speaks and that no other parameters make up for."""
+        along = lean.T @ values
+        return float(np.square(values[speaks]).sum() - along @ weight @ along)
+
+    cost = beyond(residuals)
     clear = CLEAR * max(cost / max(int(np.count_nonzero(residuals[speaks])), 1), 1.0)
     for index, stretch in enumerate(problem.stretches):
         sizes = {row: -abs(stretch.u[row] - stretch.u[row - 1]) for row in stretch.doubtful}
@@ -37,7 +47,7 @@ def placed(problem: Problem, point: Array) -> Problem:
             for start in (row - 1, row + 1):
                 u = _moved(problem.stretches[index].u, row, start)
                 other = problem.with_command(index, u)
-                moved = _beyond(other.residuals(point)[speaks], lean)
+                moved = beyond(other.residuals(point))
                 if moved < cost - clear:
                     problem, cost = other, moved
     return problem
@@ -69,9 +79,3 @@ def _moved(u: Array, row: int, start: int) -> Array:
     else:
         moved[row] = u[row - 1]
     return moved
-
-
-def _beyond(residuals: Array, lean: Array) -> float:
-    """Return the sum of squares of what is left of residuals beyond a space, shape (m, k)."""
-    inside = lean.T @ residuals
-    return float(residuals @ residuals - inside @ inside)

@@ -19,6 +19,8 @@ from .unknowns import A_1_HELD, valve_unknowns
 
 MOST_STARTS = 20
 """So many stretches, the longest, have their starting states fitted; it costs memory for each."""
+FEWEST = 100
+"""Samples of a stretch that are worth a start of their own."""
 STEP = 1e-4
 """Step of numerical derivatives, as a share of an unknown's range."""
 
@@ -175,6 +177,28 @@ class Problem:
         """Return a point of this problem as one of `with_free_a_1`."""
         share = self.with_free_a_1().unknowns.each[-1].share(A_1_HELD)
         return np.insert(point, len(self.unknowns), share)
+
+    def shortened(self, most: int) -> 'Problem':
+        """Return this problem, or one of about the first `most` samples of its stretches."""
+        left, kept, total = most, [], 0
+        for stretch in self.stretches:
+            kept.append(stretch.head(left))
+            total += stretch.u.size
+            left -= kept[-1].u.size
+            if left < FEWEST:
+                break
+        if total <= most and len(kept) == len(self.stretches):
+            return self
+        other = copy.copy(self)
+        other.stretches = kept
+        other._started = _longest(kept, MOST_STARTS)
+        other.size = len(other.unknowns) + len(other._started) * len(other._kinds)
+        other.counts = [
+            {name: mask[: stretch.u.size] for name, mask in counts.items()}
+            for stretch, counts in zip(kept, self.counts, strict=False)
+        ]
+        other._flatten()
+        return other
 
     def with_command(self, index: int, u: Array) -> 'Problem':
         """Return a copy in which one stretch has other commands, shape (n,)."""

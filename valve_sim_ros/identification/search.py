@@ -66,7 +66,7 @@ def _race(problem: Problem, seed: int, watch: Watch) -> End:
     """Race the best starts; polish the winner and let it hop."""
     view = View(problem, watch)
     staged = [view.scored(point) for point in staged_starts(problem)]
-    blind = [view.scored(point) for point in _blind(problem, seed)]
+    blind = (view.scored(point) for point in _blind(problem, seed))
     runners = staged + best_of(blind, STARTS - len(staged))
     for width, places in HEATS:
         blurred = View(problem, watch, width)
@@ -116,12 +116,13 @@ def _hops(problem: Problem, best: End, watch: Watch) -> End:
 
 def _hop(problem: Problem, view: View, best: End) -> End:
     """Leave the optimum along the ridge of each unknown and go down again from the best places."""
-    trials = [view.scored(point) for point in _around(problem, view, best)]
-    first = best_of(trials, 1)[0]
+    points = _around(problem, view, best)
+    trials = best_of((view.scored(point) for point in points), HOPPERS)
+    first = trials[0]
     if first.cost < best.cost * (1.0 - GAIN):
         return polish(problem, first.point, view.watch)
     blurred = View(problem, view.watch, HOP_WIDTH)
-    ends = [blurred.descend(end.point, 3, COARSE) for end in best_of(trials, HOPPERS)]
+    ends = [blurred.descend(end.point, 3, COARSE) for end in trials]
     end = view.scored(best_of(ends, 1)[0].point)
     if end.cost < PROMISING * best.cost:
         return polish(problem, end.point, view.watch)

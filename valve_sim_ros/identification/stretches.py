@@ -47,6 +47,14 @@ class Stretch:
     recording: int
     doubtful: tuple[int, ...] = ()
 
+    def head(self, most: int) -> 'Stretch':
+        """Return the first `most` samples."""
+        if self.u.size <= most:
+            return self
+        measured = {name: values[:most] for name, values in self.measured.items()}
+        doubtful = tuple(row for row in self.doubtful if row < most)
+        return Stretch(self.u[:most], self.dt[:most], measured, self.recording, doubtful)
+
     @cached_property
     def first(self) -> dict[str, float]:
         """The first measured value of each output that has one [% of span]."""

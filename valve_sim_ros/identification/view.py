@@ -3,6 +3,7 @@
 """A problem seen sharply or through a blur, which hides the small kinks of its cost."""
 
 from collections.abc import Iterable, Sequence
+from heapq import nsmallest
 from typing import Protocol
 
 import numpy as np
@@ -65,8 +66,8 @@ class View:
 
 
 def best_of(ends: Iterable[End], count: int) -> list[End]:
-    """Return the `count` ends of least cost, the best first."""
-    return sorted(ends, key=lambda end: end.cost)[:count]
+    """Return the `count` ends of least cost, the best first; of a generator, only those stay."""
+    return nsmallest(count, ends, key=lambda end: end.cost)
 
 
 def distinct(ends: Sequence[End], count: int, apart: float = 1e-2) -> list[End]:
