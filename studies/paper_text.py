@@ -145,7 +145,7 @@ def _order(truth, name, found, fixed):
 
 
 def _check(statement, found, agrees):
-    return statement, found, 'yes' if agrees else '**no**'
+    return statement, found, 'yes' if agrees else 'no'
 
 
 def markdown(blocks):
