@@ -111,8 +111,8 @@ def close_rivals(gains: Mapping[str, float], best: str) -> list[str]:
 def probability(gains: Mapping[str, float], best: str, closed: float) -> float:
     """Return the probability that `best` is the effect, from its lead and the gap it closes.
 
-    A logistic curve: the proportions of its three numbers were chosen by hand, their size fitted to
-    91 names on tuning records.
+    A logistic curve: the proportions of its three numbers were chosen by hand, their size was
+    fitted to 91 names on tuning records.
     """
     others = [value for name, value in gains.items() if name != best]
     lead = gains[best] - max([0.0, *others])
