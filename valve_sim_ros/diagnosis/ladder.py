@@ -147,16 +147,14 @@ def reconsidered(fitter: Fitter, group: Group, base: Valve, rungs: Sequence[Rung
         if candidate.effect in near
     ]
     own = first.valve.candidates[-1]
-    alone = fitter.fit(
-        replace(
-            second.valve,
-            values={**second.valve.values, **own.neutral},
-            effects=tuple(name for name in second.valve.effects if name != first.effect),
-            freed=(*base.freed, *added.unknowns),
-            candidates=(*base.candidates, added),
-        ),
-        fitter.problem(group, base),
+    without = replace(
+        second.valve,
+        values={**second.valve.values, **own.neutral},
+        effects=tuple(name for name in second.valve.effects if name != first.effect),
+        freed=(*base.freed, *added.unknowns),
+        candidates=(*base.candidates, added),
     )
+    alone = fitter.fit(without, fitter.problem(group, without))
     before = leftover(fitter.residuals(alone, group.signal))
     found = judged(fitter, group, alone, before, fitter.race(group, alone, candidates))
     if found is None:
