@@ -86,7 +86,7 @@ def main():
     html = render('paper.html', title=TITLE, blocks=blocks, pictures=pictures)
     write_text(arguments.out / 'paper.html', html)
     if arguments.doc:
-        arguments.doc.write_text(markdown(blocks), encoding='utf-8')
+        write_text(arguments.doc, markdown(blocks))
     print(markdown(blocks))
 
 

@@ -41,6 +41,16 @@ def test_the_best_so_far_is_kept(data, share):
         assert result.eta > 99.0
 
 
+def test_a_search_of_part_of_long_data_keeps_its_best_for_the_whole(data, monkeypatch):
+    monkeypatch.setattr('valve_sim_ros.identification.identify.MOST_SEARCHED', 500)
+    time = data.time + np.repeat([0.0, 100.0], len(data) // 2)
+    gap = Recording(time, data.u, x=data.x)
+    assert len(gap.segments) == 2
+    result = identify(gap, progress=stop_at(0.05))
+    assert result.partial
+    assert result.fitted[0]['x'].size == len(gap)
+
+
 def test_interrupt_counts_only_if_asked_for(data):
     with pytest.raises(KeyboardInterrupt):
         identify(data, progress=stop_at(0.1, KeyboardInterrupt))

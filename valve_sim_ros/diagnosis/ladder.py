@@ -102,17 +102,11 @@ def climb(
     for step in range(MOST_EFFECTS):
         if not candidates or (rungs and before.excess <= odds.CLEAN):
             break
-        runners = fitter.race(
-            group,
-            now,
-            candidates,
-            _within(progress, step),
-        )
+        runners = fitter.race(group, now, candidates, _within(progress, step))
         now = fitter.rebased(group, now, runners[:5])
-        if not rungs:
-            base = now
-            base_left = leftover(fitter.residuals(now, group.signal))
         before = leftover(fitter.residuals(now, group.signal))
+        if not rungs:
+            base, base_left = now, before
         rung = judged(fitter, group, now, before, runners)
         if rung is None:
             break

@@ -220,6 +220,8 @@ def _fit(problem: Problem, seed: int, watch: Watch) -> tuple[Covariance, Assessm
                     'stopped before anything was found; let it run a little longer'
                 ) from None
             point = watch.best.point
+            if problem.shortened(MOST_SEARCHED) is not problem:  # its starts are those of a part
+                point = problem.point(problem.values(point))
     scatter = covariance(problem.with_free_a_1(), problem.with_a_1(point))
     return scatter, assess(scatter, a_1_held=True), partial
 

@@ -75,7 +75,7 @@ def _moved(u: Array, row: int, start: int) -> Array:
     """Return the commands with the one that begins at `row` beginning at `start`."""
     moved = u.copy()
     if start < row:
-        moved[max(start, 0)] = u[row]
+        moved[start] = u[row]
     else:
         moved[row] = u[row - 1]
     return moved
