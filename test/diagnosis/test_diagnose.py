@@ -17,6 +17,7 @@ from valve_sim_ros import (
     simulate,
 )
 from valve_sim_ros.cli import main
+from valve_sim_ros.identification.watch import Stop
 
 SMALL_SET = (
     ('singles', ('p1', 'p2'), 0),
@@ -73,6 +74,33 @@ def test_the_effect_left_out_of_the_catalogue_is_not_named(small_set):
     found = diagnose(path, without=key['effects'])
     assert key['effects'][0] not in [named.rung.effect for named in found.effects]
     assert found.verdict == 'unknown_effect'
+
+
+def test_what_was_found_until_it_is_stopped_is_kept(small_set, tmp_path):
+    path, _ = small_set[0]
+    asked = []
+
+    def stop_at_p2(share, text):
+        asked.append(share)
+        if text == 'looking at p2':
+            raise Stop
+
+    found = diagnose(path, progress=stop_at_p2)
+    assert found.partial
+    assert [ladder.complete for ladder in found.ladders] == [True, False]
+    assert [ladder.group.signal for ladder in found.ladders] == ['p1', 'p2']
+    assert found.as_json()['partial']
+    assert 'not all was tried' in '\n'.join(found.lines())
+    paths = found.write(tmp_path)
+    assert all(each.exists() for each in paths)
+    assert max(asked) < 1.0
+    with pytest.raises(DiagnosisError, match='stopped before the base valve'):
+        diagnose(path, progress=stop_at_once)
+
+
+def stop_at_once(share, text):
+    if share > 0.0:
+        raise Stop
 
 
 def test_useless_data_are_refused_with_a_sentence(tmp_path):

@@ -3,10 +3,11 @@
 """`valve_sim diagnose`: recordings in, the missing effect out."""
 
 from pathlib import Path
+import sys
 
 import click
 
-from .options import progress_bar, topic_option, topics_by_signal
+from .options import INTERRUPTED, progress_bar, topic_option, topics_by_signal
 
 
 @click.command('diagnose')
@@ -37,7 +38,8 @@ def diagnose_command(
 
     Writes base.yaml, augmented.yaml, diagnosis.json, report.html and, unless the model is
     adequate, decide_by.csv: commands that tell apart what these data do not. Exit code 0 for
-    every verdict.
+    every verdict. Ctrl-C ends the search and keeps what was found so far, marked as partial (exit
+    code 130).
     """
     from ..diagnosis import diagnose
     from ..model.parameter_file import read_parameters
@@ -52,6 +54,7 @@ def diagnose_command(
             spec=spec,
             progress=progress,
             without=without,
+            interruptible=True,
         )
     for recording in result.recordings:
         for line in recording.quality.lines():
@@ -61,3 +64,5 @@ def diagnose_command(
     written = [*result.write(out), out / 'report.html']
     write_report(result, written[-1])
     click.echo('written: ' + ', '.join(map(str, written)))
+    if result.partial:
+        sys.exit(INTERRUPTED)

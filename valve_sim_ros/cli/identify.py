@@ -9,10 +9,7 @@ from typing import Any
 import click
 
 from ..identification.choices import SIGNALS, WAYS
-from .options import progress_bar, read, reading_options
-
-INTERRUPTED = 130
-"""Exit code of what Ctrl-C has ended."""
+from .options import INTERRUPTED, progress_bar, read, reading_options
 
 
 @click.command('identify')

@@ -13,6 +13,9 @@ from tqdm import tqdm
 if TYPE_CHECKING:
     from ..recordings import Recording
 
+INTERRUPTED = 130
+"""Exit code of what Ctrl-C has ended."""
+
 topic_option: Callable[[Any], Any] = click.option(
     '--topic',
     'topics',

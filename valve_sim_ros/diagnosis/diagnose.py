@@ -7,6 +7,7 @@ from dataclasses import replace
 import math
 import os
 
+from ..identification.watch import Stop
 from ..model.spec import ValveSpec
 from ..recordings import read_recording
 from ..recordings.recording import OUTPUTS, Recording
@@ -35,6 +36,7 @@ def diagnose(
     spec: ValveSpec | None = None,
     progress: Progress | None = None,
     without: Collection[str] = (),
+    interruptible: bool = False,
 ) -> Diagnosis:
     """Find where the base valve and a recording disagree, and name the effect that is missing.
 
@@ -49,9 +51,12 @@ def diagnose(
     spec : ValveSpec, optional
         What is known of the valve: where the search starts; its effects stay in force.
     progress : callable, optional
-        Called with the share done and what is being done.
+        Called with the share done and what is being done; may raise `Stop`, and what was found
+        so far is the result, marked partial.
     without : collection of str
         Effects to leave out of the catalogue.
+    interruptible : bool
+        Let Ctrl-C do the same as `Stop`.
 
     Returns
     -------
@@ -61,11 +66,11 @@ def diagnose(
     Raises
     ------
     DiagnosisError
-        If nothing can be learnt from the data.
+        If nothing can be learnt from the data, or it was stopped before the base valve was fitted.
     RecordingError
         If the data cannot be read.
     """
-    tell = progress or (lambda share, text: None)
+    tell = progress or _silent
     tell(0.0, 'reading')
     recordings = _read(data, topics)
     bench = Bench(recordings)
@@ -73,10 +78,18 @@ def diagnose(
     fitter = Fitter(bench, seed=seed)
     parts = groups(bench.signals)
     valve = _known(starting_valve(bench), spec)
-    for group in parts:
-        tell(0.05, f'fitting the base valve to {group.signal}')
-        valve = fitter.base(group, valve, group.drive)
-    ladders, base = _climb_all(fitter, parts, valve, without, tell)
+    stops = (Stop, KeyboardInterrupt) if interruptible else (Stop,)
+    try:
+        for group in parts:
+            tell(0.05, f'fitting the base valve to {group.signal}')
+            valve = fitter.base(group, valve, group.drive)
+    except stops:
+        raise DiagnosisError(
+            'stopped before the base valve was fitted; let it run a little longer'
+        ) from None
+    ladders, base = _climb_all(fitter, parts, valve, without, tell, stops)
+    if not all(ladder.complete for ladder in ladders):
+        tell = _silent  # it was asked to stop: what follows is the least that makes a result
     tell(0.88, 'refitting the base valve')
     base = _plain(fitter, parts, ladders, base)
     augmented = ladders[-1].valve
@@ -97,6 +110,15 @@ def diagnose(
         augmented_valve=augmented,
         seed=seed,
     )
+
+
+def _silent(share: float, text: str) -> None:
+    """Tell nobody."""
+
+
+def _stop(share: float, text: str) -> None:
+    """Stop whatever tells how far it is."""
+    raise Stop
 
 
 def _read(data: Data | Sequence[Data], topics: Mapping[str, str] | None) -> list[Recording]:
@@ -159,16 +181,14 @@ def _climb_all(
     valve: Valve,
     without: Collection[str],
     tell: Progress,
+    stops: tuple[type[BaseException], ...],
 ) -> tuple[list[Ladder], Valve]:
-    """Climb the ladder of each group in the order of the flow."""
+    """Climb the ladder of each group in the order of the flow; once stopped, only look at them."""
     ladders: list[Ladder] = []
     base = valve
     for index, group in enumerate(parts):
         share, width = 0.1 + 0.78 * index / len(parts), 0.78 / len(parts)
         text = f'looking at {group.signal}'
-        tell(share, text)
-        if ladders:  # the first group was fitted just so already
-            valve = fitter.base(group, valve, fitter.drive)
         known = {*without, *valve.effects}
         unknown = any(ladder.outcome == 'unknown_effect' for ladder in ladders)
         drive = fitter.drive
@@ -179,8 +199,12 @@ def _climb_all(
             group,
             valve,
             () if unknown else group.candidates(known),
-            _within(tell, share, width, text),
+            refit=bool(ladders),  # the first group was fitted just so already
+            progress=_within(tell, share, width, text),
+            stops=stops,
         )
+        if not ladder.complete:
+            tell = _stop
         fitter.drive = drive
         if FEEDBACK & {rung.effect for rung in ladder.rungs}:
             ladder = _settled(fitter, parts, ladder)

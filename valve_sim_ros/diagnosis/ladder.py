@@ -3,6 +3,7 @@
 """The ladder: in one group of stages, one effect after the other until noise is left."""
 
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -71,6 +72,13 @@ class Ladder:
     after: Leftover
     rungs: tuple[Rung, ...] = ()
     best_guess: Rung | None = None
+    complete: bool = True
+    """Whether all that could be missing was tried; not so if the diagnosis was stopped."""
+
+    @property
+    def told(self) -> str:
+        """The outcome in words."""
+        return self.outcome.replace('_', ' ') + ('' if self.complete else ', not all was tried')
 
 
 def climb(
@@ -78,7 +86,10 @@ def climb(
     group: Group,
     valve: Valve,
     candidates: Sequence[Candidate],
-    progress: Callable[[float], object] = lambda share: None,
+    *,
+    refit: bool,
+    progress: Callable[[float], object],
+    stops: tuple[type[BaseException], ...],
 ) -> Ladder:
     """Add effects to a valve as long as the evidence asks for more; not concluded yet.
 
@@ -89,42 +100,57 @@ def climb(
     group : Group
         The stages in question.
     valve : Valve
-        Fitted, with the effects of the stages before.
+        With the effects of the stages before.
     candidates : sequence of Candidate
         What may be missing.
+    refit : bool
+        Find the base valve's values in these stages anew.
     progress : callable
         Called with the share done.
+    stops : tuple of type
+        The exceptions that end the climb where it is.
     """
-    before = base_left = leftover(fitter.residuals(valve, group.signal))
-    base = now = replace(valve, cost=fitter.score(valve, group.signal, fitter.drive, COARSE))
+    least = (odds.LEAST_IF_MIXED if fitter.bench.mixed else odds.LEAST_EXCESS)[group.signal]
     rungs: list[Rung] = []
     guess = None
-    for step in range(MOST_EFFECTS):
-        if not candidates or (rungs and before.excess <= odds.CLEAN):
-            break
-        runners = fitter.race(group, now, candidates, _within(progress, step))
-        now = fitter.rebased(group, now, runners[:5])
-        before = leftover(fitter.residuals(now, group.signal))
-        if not rungs:
-            base, base_left = now, before
-        rung = judged(fitter, group, now, before, runners)
-        if rung is None:
-            break
-        if rungs:
-            enough = odds.further(rung.gains[rung.effect], before)
-            both = reconsidered(fitter, group, base, [*rungs, rung]) if enough else rungs
-            if not enough or not odds.needed(base_left, before, rung.closed, both[-1].after):
-                guess = guess or rung
+    complete = False
+
+    def seen(there: Valve) -> tuple[Valve, Leftover]:
+        cost = fitter.score(there, group.signal, fitter.drive, COARSE)
+        return replace(there, cost=cost), leftover(fitter.residuals(there, group.signal))
+
+    now, before = base, base_left = seen(valve)
+    with suppress(*stops):
+        progress(0.0)
+        if refit:
+            now, before = base, base_left = seen(fitter.base(group, valve, fitter.drive))
+        for step in range(MOST_EFFECTS):
+            if not candidates or before.excess < (odds.CLEAN if rungs else least):
                 break
-            rungs, rung = both[:-1], both[-1]
-        elif rung.closed < odds.EXPLAINED and rung.after.excess > odds.CLEAN:
-            guess = rung
-        rungs.append(rung)
-        now, before = rung.valve, rung.after
-        candidates = [c for c in candidates if c.effect != rung.effect]
+            runners = fitter.race(group, now, candidates, _within(progress, step))
+            now = fitter.rebased(group, now, runners[:5])
+            before = leftover(fitter.residuals(now, group.signal))
+            if not rungs:
+                base, base_left = now, before
+            rung = judged(fitter, group, now, before, runners)
+            if rung is None or before.excess < least:
+                break
+            if rungs:
+                enough = odds.further(rung.gains[rung.effect], before)
+                both = reconsidered(fitter, group, base, [*rungs, rung]) if enough else rungs
+                if not enough or not odds.needed(base_left, before, rung.closed, both[-1].after):
+                    guess = guess or rung
+                    break
+                rungs, rung = both[:-1], both[-1]
+            elif rung.closed < odds.EXPLAINED and rung.after.excess > odds.CLEAN:
+                guess = rung
+            rungs.append(rung)
+            now, before = rung.valve, rung.after
+            candidates = [c for c in candidates if c.effect != rung.effect]
+        progress(1.0)
+        complete = True
     after = leftover(fitter.residuals(now, group.signal))
-    progress(1.0)
-    return Ladder(group, 'adequate', base, now, base_left, after, tuple(rungs), guess)
+    return Ladder(group, 'adequate', base, now, base_left, after, tuple(rungs), guess, complete)
 
 
 def reconsidered(fitter: Fitter, group: Group, base: Valve, rungs: Sequence[Rung]) -> list[Rung]:
@@ -181,8 +207,7 @@ def judged(
     after = leftover(fitter.residuals(best, group.signal))
     change = before.mean_square - after.mean_square
     least = odds.LEAST_SHIFT if candidate.effect in odds.LASTING else odds.LEAST_CHANGE
-    least_excess = (odds.LEAST_IF_MIXED if fitter.bench.mixed else odds.LEAST_EXCESS)[group.signal]
-    if gains[candidate.effect] < odds.ENOUGH or change < least or before.excess < least_excess:
+    if gains[candidate.effect] < odds.ENOUGH or change < least:
         return None
     closed = before.closed_by(after)
     return Rung(

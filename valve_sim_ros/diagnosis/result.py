@@ -30,6 +30,8 @@ WORDS = {
     'unknown_effect': 'something is missing, and it is none of the effects in the catalogue',
 }
 
+PARTIAL = 'Partial: stopped before the end; where not all was tried, an effect may be missing'
+
 
 @dataclass(frozen=True)
 class Named:
@@ -79,6 +81,11 @@ class Diagnosis:
     seed: int = 0
 
     @property
+    def partial(self) -> bool:
+        """Whether the diagnosis was stopped before everything was tried."""
+        return not all(ladder.complete for ladder in self.ladders)
+
+    @property
     def verdict(self) -> Outcome:
         """'adequate', 'missing_effect' or 'unknown_effect'."""
         outcomes = {ladder.outcome for ladder in self.ladders}
@@ -103,6 +110,7 @@ class Diagnosis:
             'version': __version__,
             'signals': list(self.bench.signals),
             'verdict': self.verdict,
+            'partial': self.partial,
             'effects': [self._effect(named) for named in self.effects],
             'where': [
                 {
@@ -133,6 +141,7 @@ class Diagnosis:
                     'stages': list(ladder.group.stages),
                     'signal': ladder.group.signal,
                     'outcome': ladder.outcome,
+                    'complete': ladder.complete,
                     'excess_before': ladder.before.excess,
                     'excess_after': ladder.after.excess,
                     'best_guess': ladder.best_guess.effect if ladder.best_guess else None,
@@ -145,10 +154,12 @@ class Diagnosis:
     def lines(self) -> list[str]:
         """Return the verdict as text."""
         found = [f'verdict: {WORDS[self.verdict]}']
+        if self.partial:
+            found.append(PARTIAL)
         for ladder in self.ladders:
             found.append(
                 f'  {" and ".join(ladder.group.stages)}, seen in {ladder.group.signal}: '
-                f'{ladder.outcome.replace("_", " ")}; excess over the noise '
+                f'{ladder.told}; excess over the noise '
                 f'{ladder.before.excess:.3g}, then {ladder.after.excess:.3g}'
             )
         for named in self.effects:

@@ -7,7 +7,7 @@ import os
 from ..diagnosis.decision import decisions
 from ..diagnosis.ladder import Ladder
 from ..diagnosis.proof import Gap
-from ..diagnosis.result import Diagnosis, Named
+from ..diagnosis.result import Diagnosis, Named, PARTIAL
 from ..model.effects import CATALOGUE
 from ..model.files import write_text
 from . import diagnosis_plots as plots
@@ -32,6 +32,7 @@ def report(result: Diagnosis) -> str:
         'diagnosis.html',
         title=TITLES[result.verdict].format(titles),
         result=result,
+        partial=PARTIAL,
         effects=[_effect(result, named) for named in result.effects],
         stages=[_stage(ladder) for ladder in result.ladders],
         places=[
@@ -80,7 +81,7 @@ def _stage(ladder: Ladder) -> tuple[str, ...]:
     return (
         ' and '.join(ladder.group.stages),
         ladder.group.signal,
-        ladder.outcome.replace('_', ' '),
+        ladder.told,
         number(ladder.before.excess, 3),
         number(ladder.after.excess, 3),
     )
