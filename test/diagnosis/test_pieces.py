@@ -81,6 +81,37 @@ def test_score_is_the_robust_square_of_the_residual_and_stops_at_its_bound():
     assert 0.1 * whole < bench.score(values, (), 'x', bound=0.1 * whole) < whole
 
 
+def test_where_pressure_creeps_the_moment_of_a_slip_is_forgiven():
+    u = np.concatenate([np.full(20, 20.0), *(np.full(600, v) for v in (70.0, 30.0, 62.0, 25.0))])
+    slow = {
+        **VALUES,
+        'T_g1': 20.0,
+        'T_g2': 25.0,
+        'f_s': 7.0,
+        'p1_0': 20.0,
+        'p2_0': 20.0,
+        'x_0': 20.0,
+    }
+    time = 0.2 * np.arange(u.size)
+    (truth,) = Bench([Recording(time, u, x=u)]).run(complete(slow))
+    noise = 0.2 * np.random.default_rng(4).standard_normal(u.size)
+    bench = Bench([Recording(time, u, truth[0], truth[1], truth[2] + noise)])
+    own, little, much = (
+        bench.residual(bench.run(complete({**slow, 'f_s': f_s})), 'x') for f_s in (7.0, 7.05, 7.5)
+    )
+    assert np.nanmax(np.abs(own)) < 6.0
+    assert np.nanmax(np.abs(little)) < 6.0
+    assert np.nanmax(np.abs(much)) > 10.0
+
+
+def test_data_show_where_a_signal_begins_and_what_holds_the_stem():
+    record = recording(noise=0.3)
+    bench = Bench([record])
+    assert bench.stretches[0].first['x'] == pytest.approx(0.0, abs=0.2)
+    results = bench.run(complete({**VALUES, 'p1_0': 0.0, 'p2_0': 0.0, 'x_0': 0.0}))
+    assert bench.friction_seen(results) == pytest.approx(VALUES['f_s'], rel=0.25)
+
+
 @pytest.mark.parametrize('colour', [0.0, 0.5, 0.75])
 def test_noise_of_any_colour_leaves_no_excess(colour):
     rng = np.random.default_rng(2)

@@ -13,6 +13,8 @@ WINDOW = 20
 """Samples of the windows in which noise is told from misfit."""
 LARGE = 10.0
 """Errors beyond this are slips at other moments rather than misfit [noise]."""
+FAR = 4.5
+"""Errors beyond this are hardly ever noise [noise]."""
 QUIET = 0.3
 """The quietest share of the windows shows the noise."""
 
@@ -21,8 +23,8 @@ class Leftover(NamedTuple):
     """What a model leaves of a signal, in multiples of the noise seen from sample to sample.
 
     mean_square of the whole, single errors beyond LARGE growing linearly; the same with those
-    cut off at LARGE; that of the noise alone, the number of samples that count, and how many of
-    them make one independent value (coloured noise).
+    cut off at LARGE; that of the noise alone, the number of samples that count, how many of them
+    make one independent value (coloured noise), and how many are beyond FAR times the noise.
     """
 
     mean_square: float
@@ -30,6 +32,7 @@ class Leftover(NamedTuple):
     floor: float
     samples: int
     inflation: float
+    far: int = 0
 
     @property
     def excess(self) -> float:
@@ -58,12 +61,14 @@ def leftover(residual: Array) -> Leftover:
     inflation = _inflation(quiet)
     sizes = np.abs(values)
     cut = np.minimum(sizes, LARGE)
+    floor = max(floor * inflation**0.5, 0.3)
     return Leftover(
         float(np.mean(cut * (2.0 * sizes - cut))),
         float(np.mean(cut**2)),
-        max(floor * inflation**0.5, 0.3),
+        floor,
         values.size,
         inflation,
+        int(np.sum(sizes > FAR * floor**0.5)),
     )
 
 

@@ -12,6 +12,7 @@ from ..model.composition import compose
 from ..model.kernels import scored
 from ..model.parameters import DELTA
 from ..model.pipeline import Array
+from ..model.scoring import DOUBTFUL
 from ..recordings.recording import OUTPUTS, Recording
 from .errors import DiagnosisError
 from .stretch import Grid, Stretch
@@ -26,6 +27,10 @@ LEAST_AT_REST = 0.3
 """Share of the samples of p1 that counts even so."""
 TRAVEL, MOST_UNSETTLED = 8.0, 0.1
 """A record counts once the valve has travelled this far [%], or after this share."""
+SLACK = 0.03
+"""By so much p2 may be off where the stem begins to slip [% of span]."""
+LEAST_RESTS = 20
+"""Samples at rest that show what holds the stem."""
 REST = 5
 """Samples over which two means agree while the stem rests."""
 
@@ -73,7 +78,7 @@ class Bench:
         drive: Sequence[str] = (),
         coarse: float = 0.0,
     ) -> list[Array]:
-        """Return p1, p2, x of a valve, shape (3, n) per stretch.
+        """Return p1, p2, x of a valve, and 1 where a slip's moment is in doubt: (4, n) each.
 
         Parameters
         ----------
@@ -125,7 +130,7 @@ class Bench:
         composition = compose(effects, values)
         theta = np.array([*(values[name] for name in THETA), DELTA.default, 0.0])
         grid = self.stretches[index].grid(values.get('phase', 0.0), tuple(drive))
-        outputs = np.empty((3, grid.u.size))
+        outputs = np.empty((len(OUTPUTS) + 1, grid.u.size))
         score = scored()(
             grid.u,
             grid.dt,
@@ -139,6 +144,7 @@ class Bench:
             OUTPUTS.index(signal),
             grid.targets.get(signal, grid.nothing),
             grid.scales.get(signal, grid.nothing),
+            SLACK,
             bound,
         )
         return outputs, grid, score
@@ -151,14 +157,19 @@ class Bench:
         return np.array([p1, p2, x, 0.0, 0.0, 0.0, p1, p1, 0.0])
 
     def residual(self, results: Sequence[Array], name: str) -> Array:
-        """Return measured minus model of a signal over its noise, NaN where not counted."""
+        """Return measured minus model of a signal over its noise, NaN where not counted.
+
+        Where the moment of a slip is in doubt, errors of x beyond the noise do not count.
+        """
         row = OUTPUTS.index(name)
-        return np.concatenate(
-            [
-                (stretch.counts[name] - result[row]) / stretch.noise[name]
-                for stretch, result in zip(self.stretches, results, strict=True)
-            ]
-        )
+        residuals = []
+        for stretch, result in zip(self.stretches, results, strict=True):
+            residual = (stretch.counts[name] - result[row]) / stretch.noise[name]
+            if name == 'x':
+                cut = np.clip(residual, -DOUBTFUL, DOUBTFUL)
+                residual = np.where(result[-1] > 0.0, cut, residual)
+            residuals.append(residual)
+        return np.concatenate(residuals)
 
     def _uncertainty(self, name: str, values: Array) -> Array:
         """Return the noise of each sample, more where the signal moves: sample times jitter."""
@@ -167,6 +178,21 @@ class Bench:
         noise = self.noise[name]
         slope = np.maximum(slope - 2.0 * noise, 0.0)
         return np.sqrt(noise**2 + (self.jitter * slope) ** 2)
+
+    def friction_seen(self, results: Sequence[Array]) -> float:
+        """Return what holds the stem: half the range of p2 - x at rest [% of span].
+
+        `results` are p1, p2, x of a valve by stretch, shape (4, n); NaN if x does not rest.
+        """
+        each = [
+            r[1] - s.rests for s, r in zip(self.stretches, results, strict=True) if s.rests.size
+        ]
+        held = np.concatenate([*each, np.empty(0)])
+        held = held[np.isfinite(held)]
+        if held.size < LEAST_RESTS:
+            return math.nan
+        low, high = np.quantile(held, (0.005, 0.995))
+        return float(high - low) / 2.0
 
     def mixed_arrivals(self, results: Sequence[Array]) -> bool:
         """Tell whether some samples of p1 show a command and others not yet, as if by chance.

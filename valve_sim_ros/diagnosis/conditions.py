@@ -77,7 +77,7 @@ def places(
 
 def conditions(stretch: Stretch, result: Array) -> Mapping[str, Mask]:
     """Return which samples of a stretch are under which condition, shape (n,) each."""
-    p1, p2, x = result
+    p1, p2, x = result[:3]
     period = float(np.median(np.diff(stretch.time)))
     u = stretch.u
     recent = max(int(RECENT / period), 1)

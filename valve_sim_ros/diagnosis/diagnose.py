@@ -6,6 +6,7 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
 import math
 import os
+from typing import Any
 
 from ..identification.watch import Stop
 from ..model.spec import ValveSpec
@@ -191,24 +192,28 @@ def _climb_all(
         text = f'looking at {group.signal}'
         known = {*without, *valve.effects}
         unknown = any(ladder.outcome == 'unknown_effect' for ladder in ladders)
+        candidates = () if unknown else group.candidates(known)
+        how: dict[str, Any] = {'progress': _within(tell, share, width, text), 'stops': stops}
         drive = fitter.drive
-        # stages to which later ones feed back are given what was measured of these
+        # stages to which later ones feed back are given what was measured of these; the first
+        # group was fitted just so already
         fitter.drive = (*drive, *fitter.bench.signals[index + 1 :])
-        ladder = climb(
-            fitter,
-            group,
-            valve,
-            () if unknown else group.candidates(known),
-            refit=bool(ladders),  # the first group was fitted just so already
-            progress=_within(tell, share, width, text),
-            stops=stops,
-        )
-        if not ladder.complete:
-            tell = _stop
+        ladder = climb(fitter, group, valve, candidates, refit=bool(ladders), **how)
         fitter.drive = drive
         if FEEDBACK & {rung.effect for rung in ladder.rungs}:
             ladder = _settled(fitter, parts, ladder)
         ladder = concluded(ladder)
+        if ladder.outcome == 'unknown_effect' and ladder.complete and 'p2-x' in group.stages:
+            # a stem that slips on and on is soon a whole slip off: put to rest where it was seen
+            # to rest, it shows what the next slip lacks
+            fitter.drive = (*drive, 'x')
+            eased = concluded(climb(fitter, group, valve, candidates, refit=True, **how))
+            fitter.drive = drive
+            if eased.outcome == 'missing_effect':
+                named = fitter.refined(eased.valve, fitter.problem(group, eased.valve))
+                ladder = replace(eased, valve=named, base=ladder.base)
+        if not ladder.complete:
+            tell = _stop
         ladders.append(ladder)
         valve = ladder.valve
         inexact = group.signal == 'p1' and ladder.after.excess > odds.CLEAN

@@ -17,7 +17,7 @@ from .bench import Bench, MIXED_JITTER
 from .descent import descend, walk
 from .evolution import evolve
 from .stages import Candidate, Group
-from .starts import friction_grid, grid, START
+from .starts import friction_grid, grid, START, STEMS
 from .unknowns import complete, EARLY, LATE, PHASE, to_point, to_values, Unknown
 
 STEM_STARTS = 6
@@ -28,13 +28,16 @@ SHORT = 4
 """Steps of a descent that only shows where it leads."""
 SCREENING, COARSE = 0.1, 0.04
 """Steps inside a sample while candidates are screened, and fitted [s]."""
-SPREAD = 5.0
-"""Standard deviation with which an evolution begins [steps of the unknowns]."""
+SPREAD, NARROW = 5.0, 3.0
+"""Standard deviation with which an evolution begins, and near an optimum [steps of unknowns]."""
+FOLLOWED = 4
+"""So many base valves are followed by an evolution where costs are rugged."""
 POPULATION = 14
 ROUNDS = ((40, 5), (10, 14), (4, 30))
 """Rounds of a race where costs are rugged: how many still run, and for how many generations."""
-MOST_STARTS = 24
-"""Up to so many starts of an effect are tried with each level of friction."""
+MOST_STARTS, FEWER_STARTS = 24, 8
+"""Up to so many starts of an effect are tried with each level of friction; if there are more, only
+so many of the best."""
 SCREENED, FINISHERS, REFINED = 3, 5, 2
 """How many starts of a candidate are followed, runners refitted, and refined to the end."""
 
@@ -140,37 +143,52 @@ class Fitter:
             valve, values=to_values(unknowns, found.point, valve.values), cost=found.cost
         )
 
+    def _results(self, valve: Valve) -> list[Array]:
+        """Return p1, p2, x of a valve by stretch, driven as is usual here."""
+        return self.bench.run(complete(valve.values), valve.effects, self.drive, COARSE)
+
     def base(self, group: Group, valve: Valve, drive: Sequence[str]) -> Valve:
         """Find the base valve's values in one group from a grid, `drive` as measured."""
         if group.stages == ('u-p1',) and drive == group.drive:
             self._settle_phase(group, valve)
             valve = replace(valve, values={**valve.values, 'phase': self.phase_start})
         problem = (self.unknowns(group), group.signal, tuple(drive))
-        fresh = {n: START[n] for n in ('a_1/a_2', 'damping')} if 'p2-x' in group.stages else {}
-        starts = [{**valve.values, **fresh, **there} for there in grid(problem[0])]
+        stems = STEMS if 'p2-x' in group.stages else ({},)
+        points = grid(problem[0])
+        starts = [{**valve.values, **stem, **there} for stem in stems for there in points]
         starts.append(dict(valve.values))
         alone = group.stages == ('p2-x',)
+        if alone:
+            seen = self.bench.friction_seen(self._results(valve))
+            starts += [{**valve.values, **there} for there in friction_grid(seen)]
         found = self._best_of(valve, starts, problem, STEM_STARTS if alone else 3)
         if 'p2-x' not in group.stages:
             return self.refined(found[0], problem)
         # put to rest where it was seen to rest, a stem that slips too late is only a little wrong
         eased = (problem[0], problem[1], (*problem[2], 'x'))
         eases = self._best_of(valve, starts, eased, STEM_STARTS if alone else 3)
-        best = min((self.evolve(each, eased, 30, coarse=COARSE) for each in eases), key=_cost)
-        found.append(self.fit(best, problem, SHORT))
-        found += [self.evolve(each, problem, 30, coarse=COARSE) for each in (found[0], found[-1])]
+
+        with ThreadPoolExecutor(os.cpu_count()) as pool:  # compiled runs release the lock
+            others = pool.map(lambda each: self._eased(each, problem), eases)
+            found = sorted([*found, *others], key=_cost)[:FOLLOWED]
+            found += pool.map(lambda each: self.evolve(each, problem, 30, NARROW, COARSE), found)
         return self.refined(min(found, key=_cost), problem)
 
     def refined(self, valve: Valve, problem: 'Problem') -> Valve:
         """Return a valve after descents and, where costs are rugged, evolutions in turn."""
         valve = self.fit(valve, problem)
         while 'f_s' in (unknown.name for unknown in problem[0]):
-            more = self.evolve(valve, problem, 40, spread=3.0, coarse=COARSE)
+            more = self.evolve(valve, problem, 40, NARROW, COARSE)
             more = self.fit(more, problem)
             if more.cost > 0.99 * valve.cost:
                 return min(valve, more, key=_cost)
             valve = more
         return valve
+
+    def _eased(self, valve: Valve, problem: 'Problem') -> Valve:
+        """Return what evolution finds with the stem put to rest as seen, then fitted without."""
+        eased = (problem[0], problem[1], (*problem[2], 'x'))
+        return self.fit(self.evolve(valve, eased, 30, NARROW, COARSE), problem, SHORT)
 
     def race(
         self,
@@ -181,7 +199,12 @@ class Fitter:
     ) -> list[Valve]:
         """Return valves with one more effect, best first; the better, the more refitted."""
         rugged = 'p2-x' in group.stages
-        residual = self.residuals(valve, group.signal, self.drive) if rugged else np.zeros(0)
+        peaks: tuple[float, ...] = ()
+        frictions: list[dict[str, float]] = []
+        if rugged:
+            results = self._results(valve)
+            peaks = self._peaks(np.nan_to_num(self.bench.residual(results, group.signal)))
+            frictions = friction_grid(self.bench.friction_seen(results))
         done, total = 0, len(candidates) + FINISHERS
 
         def count(runner: Valve) -> Valve:
@@ -195,7 +218,9 @@ class Fitter:
             return min(runner, more, key=_cost)
 
         with ThreadPoolExecutor(os.cpu_count()) as pool:  # compiled runs release the lock
-            screened = pool.map(lambda c: self._screen(c, group, valve, residual), candidates)
+            screened = pool.map(
+                lambda c: self._screen(c, group, valve, peaks, frictions), candidates
+            )
             runners = sorted((count(each) for each in screened), key=_cost)
             for left, generations in ROUNDS if rugged else ():
                 first = pool.map(evolved, runners[:left], repeat(generations))
@@ -227,7 +252,14 @@ class Fitter:
         """A phase to start from."""
         return min(max(0.0, self.phase.lower), self.phase.upper)
 
-    def _screen(self, candidate: Candidate, group: Group, valve: Valve, residual: Array) -> Valve:
+    def _screen(
+        self,
+        candidate: Candidate,
+        group: Group,
+        valve: Valve,
+        peaks: tuple[float, ...],
+        frictions: Sequence[dict[str, float]],
+    ) -> Valve:
         """Return the valve with one more effect after a short refit of its group."""
         there = replace(
             valve,
@@ -235,9 +267,15 @@ class Fitter:
             freed=(*valve.freed, *candidate.unknowns),
             candidates=(*valve.candidates, candidate),
         )
-        own = candidate.starts(self._peaks(residual))
-        bases = ({}, *friction_grid(group)) if len(own) <= MOST_STARTS else ({},)
+        own = candidate.starts(peaks)
         problem = self.problem(group, there)
+        rugged = 'p2-x' in group.stages
+        eased = (problem[0], problem[1], (*problem[2], 'x')) if rugged else problem
+        if len(own) > MOST_STARTS:
+            firsts = [{**candidate.neutral, **valve.values, **start} for start in own]
+            costs = [self._scan(there, [first], eased, SCREENING)[0].cost for first in firsts]
+            own = [own[index] for index in np.argsort(costs, kind='stable')[:FEWER_STARTS]]
+        bases = ({}, *frictions)
         starts = [
             [{**candidate.neutral, **valve.values, **base, **start} for base in bases]
             for start in own
@@ -248,15 +286,12 @@ class Fitter:
             return sorted(each, key=_cost)[:count]
 
         found = best(problem, SCREENED)
-        if 'p2-x' in group.stages:
-            eased = (problem[0], problem[1], (*problem[2], 'x'))
+        if rugged:
             found += [self.fit(each, eased, SHORT, SCREENING) for each in best(eased, 1)]
         return min((self.fit(each, problem, SHORT, SCREENING) for each in found), key=_cost)
 
     def _peaks(self, residual: Array) -> tuple[float, ...]:
         """Return the frequencies at which a residual swings most, and their neighbours [Hz]."""
-        if not residual.size:
-            return ()
         period = float(np.median(np.diff(self.bench.stretches[0].time)))
         frequency, power = periodogram(np.clip(residual, -10.0, 10.0), 1.0 / period)
         inside = (frequency > 0.02) & (frequency < 0.45 / period)

@@ -110,7 +110,6 @@ def climb(
     stops : tuple of type
         The exceptions that end the climb where it is.
     """
-    least = (odds.LEAST_IF_MIXED if fitter.bench.mixed else odds.LEAST_EXCESS)[group.signal]
     rungs: list[Rung] = []
     guess = None
     complete = False
@@ -119,13 +118,18 @@ def climb(
         cost = fitter.score(there, group.signal, fitter.drive, COARSE)
         return replace(there, cost=cost), leftover(fitter.residuals(there, group.signal))
 
+    def worth(left: Leftover) -> bool:
+        if rungs:
+            return left.excess > odds.CLEAN
+        return odds.suspicious(left, group.signal, fitter.bench.mixed)
+
     now, before = base, base_left = seen(valve)
     with suppress(*stops):
         progress(0.0)
         if refit:
             now, before = base, base_left = seen(fitter.base(group, valve, fitter.drive))
         for step in range(MOST_EFFECTS):
-            if not candidates or before.excess < (odds.CLEAN if rungs else least):
+            if not candidates or not worth(before):
                 break
             runners = fitter.race(group, now, candidates, _within(progress, step))
             now = fitter.rebased(group, now, runners[:5])
@@ -133,7 +137,7 @@ def climb(
             if not rungs:
                 base, base_left = now, before
             rung = judged(fitter, group, now, before, runners)
-            if rung is None or before.excess < least:
+            if rung is None or not worth(before):
                 break
             if rungs:
                 enough = odds.further(rung.gains[rung.effect], before)
@@ -144,6 +148,8 @@ def climb(
                 rungs, rung = both[:-1], both[-1]
             elif rung.closed < odds.EXPLAINED and rung.after.excess > odds.CLEAN:
                 guess = rung
+                if rung.closed < odds.HOPELESS:
+                    break
             rungs.append(rung)
             now, before = rung.valve, rung.after
             candidates = [c for c in candidates if c.effect != rung.effect]

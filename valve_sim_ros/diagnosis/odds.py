@@ -35,6 +35,8 @@ LEAST_EXCESS = {'p1': 0.02, 'p2': 0.5, 'x': 0.02}
 LEAST_IF_MIXED = {**LEAST_EXCESS, 'p1': 0.3}
 """Least excess before a name is sought in a signal, and where commands arrive just as samples are
 taken: the start of each move then scatters by up to a sample, and lags fit that a little."""
+LEAST_FAR = 3
+"""So many errors of x beyond any noise do as well: a few slips come at another moment."""
 ADEQUATE = {'p1': 0.8, 'p2': 1.2, 'x': 0.8}
 """Excess over the noise that still counts as adequate (other solvers, jitter)."""
 CLEAN = 0.25
@@ -42,9 +44,17 @@ CLEAN = 0.25
 EXPLAINED, LEAST_CLOSED = 0.85, 0.5
 """Least part of the excess that a name must close, else the effect is unknown; and where nothing
 but noise is left."""
+HOPELESS = 0.1
+"""A first effect that closes less than this part of the excess is not followed by a second."""
 TWIN_GAIN, TWIN_SHARE, KNOWN_TWIN_SHARE = 12.0, 0.003, 0.02
 """Rivals whose gain is less than this, or this share of the gain, behind cannot be excluded; those
 that are declared to look alike need not come as close."""
+
+
+def suspicious(left: Leftover, signal: str, mixed: bool) -> bool:
+    """Tell whether what the base valve leaves of a signal makes it worth to look for an effect."""
+    least = (LEAST_IF_MIXED if mixed else LEAST_EXCESS)[signal]
+    return left.excess >= least or (signal == 'x' and left.far >= LEAST_FAR)
 
 
 def gain(before: float, after: Valve, inflation: float, count: int) -> float:

@@ -5,7 +5,6 @@
 from collections.abc import Sequence
 from itertools import product
 
-from .stages import Group
 from .unknowns import Unknown
 
 START: dict[str, float] = {
@@ -30,6 +29,10 @@ STEM_GRID: dict[str, tuple[float, ...]] = {
     'f_s': (0.5, 1.0, 1.6, 2.4, 3.4, 4.6, 6.0, 7.5, 9.0, 11.0, 13.0, 16.0),
     'f_d/f_s': (0.3, 0.45, 0.6, 0.75, 0.9),
 }
+STEMS = ({'a_1/a_2': 12.0, 'damping': 1.8}, {'a_1/a_2': 25.0, 'damping': 0.7})
+"""A stem that creeps to its place, and one that overshoots."""
+AROUND = (0.9, 1.0)
+"""Shares of the friction that the data show from which a search starts."""
 
 
 def grid(unknowns: Sequence[Unknown]) -> list[dict[str, float]]:
@@ -39,12 +42,14 @@ def grid(unknowns: Sequence[Unknown]) -> list[dict[str, float]]:
     return [dict(zip(names, point, strict=True)) for point in product(*(values[n] for n in names))]
 
 
-def friction_grid(group: Group) -> list[dict[str, float]]:
-    """Return starts of the friction, which a valve without the effect may have far off."""
-    if 'p2-x' not in group.stages:
-        return []
+def friction_grid(seen: float) -> list[dict[str, float]]:
+    """Return starts of the friction, which a valve without the effect may have far off.
+
+    `seen` is what holds the stem as the data show it [% of span], NaN if they do not.
+    """
+    levels = [*GRID['f_s'], *(share * seen for share in AROUND if seen > 0.0)]
     return [
         {'f_s': f_s, 'f_d/f_s': share, 'a_1/a_2': START['a_1/a_2'], 'damping': START['damping']}
-        for f_s in GRID['f_s']
+        for f_s in levels
         for share in GRID['f_d/f_s']
     ]
