@@ -203,14 +203,25 @@ def say_paced(count, rate, found):
 
 @click.command()
 @click.option('--seconds', default=10.0, show_default=True, help='Length of each paced run.')
-@click.option('--steps', default=30_000, show_default=True, help='Steps of each lockstep run.')
-def main(seconds, steps):
+@click.option('--steps', default=30_000, show_default=True, help='Lockstep steps; 0: none.')
+@click.option(
+    '--paced',
+    'cases',
+    multiple=True,
+    metavar='VALVES@HZ',
+    default=('1@2000', '1@200', '10@200', '100@5'),
+    show_default=True,
+    help='A paced run; repeatable.',
+)
+def main(seconds, steps, cases):
     """Measure and print all figures."""
     load = os.getloadavg()[0]
     print(f'{os.cpu_count()} cores, load of the machine before the start: {load:.1f}')
-    for count, rate in ((1, 2000.0), (1, 200.0), (10, 200.0), (100, 5.0)):
-        say_paced(count, rate, measure(paced, count, rate, seconds))
-    for own_process, words in ((False, 'one process'), (True, 'two processes')):
+    for case in cases:
+        count, rate = map(float, case.split('@'))
+        say_paced(int(count), rate, measure(paced, int(count), rate, seconds))
+    ways = ((False, 'one process'), (True, 'two processes'))
+    for own_process, words in ways if steps else ():
         found = measure(lockstep, own_process, steps)
         memory = found['memory']
         print(f'lockstep in {words}: {found["rate"]:.0f} steps/s over {steps} steps')
