@@ -6,7 +6,6 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
 import math
 import os
-from typing import Any
 
 from ..identification.watch import Stop
 from ..model.spec import ValveSpec
@@ -22,7 +21,7 @@ from .intervals import intervals
 from .ladder import climb, concluded, Ladder
 from .proof import prove
 from .result import Diagnosis, Named
-from .stages import Group, groups
+from .stages import Candidate, Group, groups
 from .unknowns import complete
 
 Data = Recording | str | os.PathLike[str]
@@ -193,25 +192,27 @@ def _climb_all(
         known = {*without, *valve.effects}
         unknown = any(ladder.outcome == 'unknown_effect' for ladder in ladders)
         candidates = () if unknown else group.candidates(known)
-        how: dict[str, Any] = {'progress': _within(tell, share, width, text), 'stops': stops}
         drive = fitter.drive
         # stages to which later ones feed back are given what was measured of these; the first
         # group was fitted just so already
         fitter.drive = (*drive, *fitter.bench.signals[index + 1 :])
-        ladder = climb(fitter, group, valve, candidates, refit=bool(ladders), **how)
+        ladder = climb(
+            fitter,
+            group,
+            valve,
+            candidates,
+            refit=bool(ladders),
+            progress=_within(tell, share, width, text),
+            stops=stops,
+        )
         fitter.drive = drive
         if FEEDBACK & {rung.effect for rung in ladder.rungs}:
             ladder = _settled(fitter, parts, ladder)
         ladder = concluded(ladder)
-        if ladder.outcome == 'unknown_effect' and ladder.complete and 'p2-x' in group.stages:
-            # a stem that slips on and on is soon a whole slip off: put to rest where it was seen
-            # to rest, it shows what the next slip lacks
-            fitter.drive = (*drive, 'x')
-            eased = concluded(climb(fitter, group, valve, candidates, refit=True, **how))
-            fitter.drive = drive
-            if eased.outcome == 'missing_effect':
-                named = fitter.refined(eased.valve, fitter.problem(group, eased.valve))
-                ladder = replace(eased, valve=named, base=ladder.base)
+        unexplained = ladder.outcome == 'unknown_effect' and ladder.complete
+        if unexplained and candidates and 'p2-x' in group.stages:
+            again = _within(tell, share + width, 0.0, f'{text} again')
+            ladder = _second_look(fitter, group, ladder, candidates, again, stops)
         if not ladder.complete:
             tell = _stop
         ladders.append(ladder)
@@ -223,6 +224,30 @@ def _climb_all(
             fitter.drive = (*fitter.drive, group.signal)
     fitter.drive = ()
     return ladders, base
+
+
+def _second_look(
+    fitter: Fitter,
+    group: Group,
+    ladder: Ladder,
+    candidates: Sequence[Candidate],
+    progress: Callable[[float], object],
+    stops: tuple[type[BaseException], ...],
+) -> Ladder:
+    """Return what a stem shows that is put to rest where it was seen to rest, if it is named.
+
+    A stem that slips on and on is soon a whole slip off, and then hides what each slip lacks.
+    """
+    drive = fitter.drive
+    fitter.drive = (*drive, 'x')
+    eased = concluded(
+        climb(fitter, group, ladder.valve, candidates, refit=True, progress=progress, stops=stops)
+    )
+    fitter.drive = drive
+    if eased.outcome != 'missing_effect':
+        return replace(ladder, complete=ladder.complete and eased.complete)
+    valve = fitter.refined(eased.valve, fitter.problem(group, eased.valve))
+    return replace(eased, valve=valve, base=ladder.base)
 
 
 def _within(tell: Progress, start: float, width: float, text: str) -> Callable[[float], object]:

@@ -165,11 +165,10 @@ class Fitter:
         if 'p2-x' not in group.stages:
             return self.refined(found[0], problem)
         # put to rest where it was seen to rest, a stem that slips too late is only a little wrong
-        eased = (problem[0], problem[1], (*problem[2], 'x'))
-        eases = self._best_of(valve, starts, eased, STEM_STARTS if alone else 3)
+        eases = self._best_of(valve, starts, _eased(problem), STEM_STARTS if alone else 3)
 
         with ThreadPoolExecutor(os.cpu_count()) as pool:  # compiled runs release the lock
-            others = pool.map(lambda each: self._eased(each, problem), eases)
+            others = pool.map(lambda each: self._by_way_of_rests(each, problem), eases)
             found = sorted([*found, *others], key=_cost)[:FOLLOWED]
             found += pool.map(lambda each: self.evolve(each, problem, 30, NARROW, COARSE), found)
         return self.refined(min(found, key=_cost), problem)
@@ -185,10 +184,10 @@ class Fitter:
             valve = more
         return valve
 
-    def _eased(self, valve: Valve, problem: 'Problem') -> Valve:
+    def _by_way_of_rests(self, valve: Valve, problem: 'Problem') -> Valve:
         """Return what evolution finds with the stem put to rest as seen, then fitted without."""
-        eased = (problem[0], problem[1], (*problem[2], 'x'))
-        return self.fit(self.evolve(valve, eased, 30, NARROW, COARSE), problem, SHORT)
+        found = self.evolve(valve, _eased(problem), 30, NARROW, COARSE)
+        return self.fit(found, problem, SHORT)
 
     def race(
         self,
@@ -270,7 +269,7 @@ class Fitter:
         own = candidate.starts(peaks)
         problem = self.problem(group, there)
         rugged = 'p2-x' in group.stages
-        eased = (problem[0], problem[1], (*problem[2], 'x')) if rugged else problem
+        eased = _eased(problem) if rugged else problem
         if len(own) > MOST_STARTS:
             firsts = [{**candidate.neutral, **valve.values, **start} for start in own]
             costs = [self._scan(there, [first], eased, SCREENING)[0].cost for first in firsts]
@@ -349,6 +348,12 @@ class Fitter:
 
 Problem = tuple[tuple[Unknown, ...], str, tuple[str, ...]]
 """What a fit varies, the signal it looks at, and the signals that drive the stages."""
+
+
+def _eased(problem: Problem) -> Problem:
+    """Return the problem in which the stem is put to rest where it was seen to rest."""
+    unknowns, signal, drive = problem
+    return unknowns, signal, (*drive, 'x')
 
 
 def _cost(valve: Valve) -> float:
