@@ -18,6 +18,7 @@ from valve_sim_ros import (
 )
 from valve_sim_ros.cli import main
 from valve_sim_ros.identification.watch import Stop
+from valve_sim_ros.report.diagnosis import report
 
 SMALL_SET = (
     ('singles', ('p1', 'p2'), 0),
@@ -94,6 +95,9 @@ def test_what_was_found_until_it_is_stopped_is_kept(small_set, tmp_path):
     paths = found.write(tmp_path)
     assert all(each.exists() for each in paths)
     assert max(asked) < 1.0
+    page = report(found)
+    assert 'Partial: stopped' in page
+    assert ('Stopped early' in page) == (not found.effects)
     with pytest.raises(DiagnosisError, match='stopped before the base valve'):
         diagnose(path, progress=stop_at_once)
 

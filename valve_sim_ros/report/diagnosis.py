@@ -28,11 +28,13 @@ def write_report(result: Diagnosis, path: str | os.PathLike[str]) -> None:
 def report(result: Diagnosis) -> str:
     """Return the report of a diagnosis as HTML."""
     titles = ' and '.join(CATALOGUE[named.rung.effect].title for named in result.effects)
+    settled = bool(result.effects) or not result.partial
     return render(
         'diagnosis.html',
-        title=TITLES[result.verdict].format(titles),
+        title=TITLES[result.verdict].format(titles) if settled else 'Stopped early',
         result=result,
         partial=PARTIAL,
+        settled=settled,
         effects=[_effect(result, named) for named in result.effects],
         stages=[_stage(ladder) for ladder in result.ladders],
         places=[
