@@ -11,12 +11,13 @@ from scipy.signal import lfilter
 from valve_sim_ros import simulate
 from valve_sim_ros.diagnosis import odds
 from valve_sim_ros.diagnosis.adequacy import Leftover, leftover
+from valve_sim_ros.diagnosis.base_valve import starting_valve
 from valve_sim_ros.diagnosis.bench import Bench
 from valve_sim_ros.diagnosis.conditions import places
 from valve_sim_ros.diagnosis.decision import TestSignal
 from valve_sim_ros.diagnosis.descent import cost_of, descend, walk
 from valve_sim_ros.diagnosis.evolution import evolve
-from valve_sim_ros.diagnosis.fitting import Fitter, starting_valve
+from valve_sim_ros.diagnosis.fitting import Fitter
 from valve_sim_ros.diagnosis.proof import closed
 from valve_sim_ros.diagnosis.stages import groups
 from valve_sim_ros.diagnosis.unknowns import complete

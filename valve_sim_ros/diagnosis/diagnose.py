@@ -3,6 +3,7 @@
 """From recordings to a verdict: find, name, add, show."""
 
 from collections.abc import Callable, Collection, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
 import math
 import os
@@ -13,10 +14,11 @@ from ..recordings import read_recording
 from ..recordings.recording import OUTPUTS, Recording
 from . import odds
 from .adequacy import leftover
+from .base_valve import find_base, starting_valve
 from .bench import Bench
 from .conditions import Place, places
 from .errors import DiagnosisError
-from .fitting import Fitter, starting_valve, Valve
+from .fitting import Fitter, Valve
 from .intervals import intervals
 from .ladder import climb, concluded, Ladder
 from .proof import prove
@@ -71,25 +73,24 @@ def diagnose(
         If the data cannot be read.
     """
     tell = progress or _silent
-    tell(0.0, 'reading')
-    recordings = _read(data, topics)
-    bench = Bench(recordings)
-    _refuse_useless(bench)
-    fitter = Fitter(bench, seed=seed)
-    parts = groups(bench.signals)
-    valve = _known(starting_valve(bench), spec)
     stops = (Stop, KeyboardInterrupt) if interruptible else (Stop,)
     try:
+        tell(0.0, 'reading')
+        recordings = _read(data, topics)
+        bench = Bench(recordings)
+        _refuse_useless(bench)
+        fitter = Fitter(bench, seed=seed)
+        parts = groups(bench.signals)
+        valve = _known(starting_valve(bench), spec)
         for group in parts:
             tell(0.05, f'fitting the base valve to {group.signal}')
-            valve = fitter.base(group, valve, group.drive)
+            valve = find_base(fitter, group, valve, group.drive)
     except stops:
         raise DiagnosisError(
             'stopped before the base valve was fitted; let it run a little longer'
         ) from None
     ladders, base = _climb_all(fitter, parts, valve, without, tell, stops)
-    if not all(ladder.complete for ladder in ladders):
-        tell = _silent  # it was asked to stop: what follows is the least that makes a result
+    tell = _heedless(tell)
     tell(0.88, 'refitting the base valve')
     base = _plain(fitter, parts, ladders, base)
     augmented = ladders[-1].valve
@@ -119,6 +120,16 @@ def _silent(share: float, text: str) -> None:
 def _stop(share: float, text: str) -> None:
     """Stop whatever tells how far it is."""
     raise Stop
+
+
+def _heedless(tell: Progress) -> Progress:
+    """Return how to tell the last steps, the least that makes a result: they are not stopped."""
+
+    def told(share: float, text: str) -> None:
+        with suppress(Stop):
+            tell(share, text)
+
+    return told
 
 
 def _read(data: Data | Sequence[Data], topics: Mapping[str, str] | None) -> list[Recording]:
@@ -210,7 +221,7 @@ def _climb_all(
             ladder = _settled(fitter, parts, ladder)
         ladder = concluded(ladder)
         unexplained = ladder.outcome == 'unknown_effect' and ladder.complete
-        if unexplained and candidates and 'p2-x' in group.stages:
+        if unexplained and candidates and group.has_stem:
             again = _within(tell, share + width, 0.0, f'{text} again')
             ladder = _second_look(fitter, group, ladder, candidates, again, stops)
         if not ladder.complete:
@@ -266,7 +277,7 @@ def _settled(fitter: Fitter, parts: Sequence[Group], ladder: Ladder) -> Ladder:
     for cycle in range(CYCLES):
         for group in parts:
             if cycle == 0 and group is not ladder.group:
-                valve = fitter.base(group, valve, fitter.drive)
+                valve = find_base(fitter, group, valve, fitter.drive)
             else:
                 valve = fitter.fit(valve, fitter.problem(group, valve))
     after = leftover(fitter.residuals(valve, ladder.group.signal))
@@ -282,7 +293,7 @@ def _plain(
     added = False
     for group, ladder in zip(parts, ladders, strict=True):
         if added:
-            base = fitter.base(group, base, ())
+            base = find_base(fitter, group, base, ())
         else:
             names = [unknown.name for unknown in fitter.unknowns(group)]
             found = {name: ladder.base.values[name] for name in names}

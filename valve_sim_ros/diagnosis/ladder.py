@@ -9,7 +9,9 @@ from typing import Literal
 
 from . import odds
 from .adequacy import Leftover, leftover
+from .base_valve import find_base
 from .fitting import COARSE, Fitter, Valve
+from .race import race, rebased
 from .stages import Candidate, Group
 
 MOST_EFFECTS = 2
@@ -127,17 +129,17 @@ def climb(
     with suppress(*stops):
         progress(0.0)
         if refit:
-            now, before = base, base_left = seen(fitter.base(group, valve, fitter.drive))
+            now, before = base, base_left = seen(find_base(fitter, group, valve, fitter.drive))
         for step in range(MOST_EFFECTS):
             if not candidates or not worth(before):
                 break
-            runners = fitter.race(group, now, candidates, _within(progress, step))
-            now = fitter.rebased(group, now, runners[:5])
+            runners = race(fitter, group, now, candidates, _within(progress, step))
+            now = rebased(fitter, group, now, runners[:5])
             before = leftover(fitter.residuals(now, group.signal))
             if not rungs:
                 base, base_left = now, before
-            rung = judged(fitter, group, now, before, runners)
-            if rung is None or not worth(before):
+            rung = judged(fitter, group, now, before, runners) if worth(before) else None
+            if rung is None:
                 break
             if rungs:
                 enough = odds.further(rung.gains[rung.effect], before)
@@ -148,7 +150,7 @@ def climb(
                 rungs, rung = both[:-1], both[-1]
             elif rung.closed < odds.EXPLAINED and rung.after.excess > odds.CLEAN:
                 guess = rung
-                if rung.closed < odds.HOPELESS:
+                if rung.closed < odds.LEAST_FIRST:
                     break
             rungs.append(rung)
             now, before = rung.valve, rung.after
@@ -182,7 +184,7 @@ def reconsidered(fitter: Fitter, group: Group, base: Valve, rungs: Sequence[Rung
     )
     alone = fitter.fit(without, fitter.problem(group, without))
     before = leftover(fitter.residuals(alone, group.signal))
-    found = judged(fitter, group, alone, before, fitter.race(group, alone, candidates))
+    found = judged(fitter, group, alone, before, race(fitter, group, alone, candidates))
     if found is None:
         return list(rungs)
     worse = 0.5 * (found.valve.cost - second.valve.cost) / found.after.inflation

@@ -44,7 +44,7 @@ CLEAN = 0.25
 EXPLAINED, LEAST_CLOSED = 0.85, 0.5
 """Least part of the excess that a name must close, else the effect is unknown; and where nothing
 but noise is left."""
-HOPELESS = 0.1
+LEAST_FIRST = 0.1
 """A first effect that closes less than this part of the excess is not followed by a second."""
 TWIN_GAIN, TWIN_SHARE, KNOWN_TWIN_SHARE = 12.0, 0.003, 0.02
 """Rivals whose gain is less than this, or this share of the gain, behind cannot be excluded; those

@@ -75,6 +75,11 @@ class Group:
     stages: tuple[str, ...]
     drive: tuple[str, ...]
 
+    @property
+    def has_stem(self) -> bool:
+        """Whether the stem is in it: its slips make costs rugged."""
+        return 'p2-x' in self.stages
+
     def unknowns(self, stretches: int, phase: Unknown = PHASE) -> tuple[Unknown, ...]:
         """Return what a fit of the base valve varies here."""
         base = [unknown for stage in self.stages for unknown in BASE_UNKNOWNS[stage]]

@@ -29,7 +29,10 @@ STEM_GRID: dict[str, tuple[float, ...]] = {
     'f_s': (0.5, 1.0, 1.6, 2.4, 3.4, 4.6, 6.0, 7.5, 9.0, 11.0, 13.0, 16.0),
     'f_d/f_s': (0.3, 0.45, 0.6, 0.75, 0.9),
 }
-STEMS = ({'a_1/a_2': 12.0, 'damping': 1.8}, {'a_1/a_2': 25.0, 'damping': 0.7})
+STEMS = (
+    {name: START[name] for name in ('a_1/a_2', 'damping')},
+    {'a_1/a_2': 25.0, 'damping': 0.7},
+)
 """A stem that creeps to its place, and one that overshoots."""
 AROUND = (0.9, 1.0)
 """Shares of the friction that the data show from which a search starts."""
@@ -49,7 +52,5 @@ def friction_grid(seen: float) -> list[dict[str, float]]:
     """
     levels = [*GRID['f_s'], *(share * seen for share in AROUND if seen > 0.0)]
     return [
-        {'f_s': f_s, 'f_d/f_s': share, 'a_1/a_2': START['a_1/a_2'], 'damping': START['damping']}
-        for f_s in levels
-        for share in GRID['f_d/f_s']
+        {'f_s': f_s, 'f_d/f_s': share, **STEMS[0]} for f_s in levels for share in GRID['f_d/f_s']
     ]

@@ -1,0 +1,81 @@
+# Copyright 2026 The valve_sim_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The search for the base valve, with effects in force or without."""
+
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+import os
+
+from .bench import Bench, MIXED_JITTER
+from .fitting import by_cost, COARSE, eased, Fitter, NARROW, Problem, SHORT, Valve
+from .stages import Group
+from .starts import friction_grid, grid, START, STEMS
+from .unknowns import EARLY, LATE, PHASE
+
+FEW_STARTS, STEM_STARTS = 3, 6
+"""So many starts are followed, and where only the stem is sought."""
+FOLLOWED, GENERATIONS = 4, 30
+"""So many base valves are followed by an evolution where costs are rugged, and for how long."""
+
+
+def starting_valve(bench: Bench) -> Valve:
+    """Return a valve to start from, its starting values as measured."""
+    values = dict(START)
+    for index in range(len(bench.stretches)):
+        suffix = f'.{index}' if index else ''
+        p1, p2, x = (float(v) for v in bench.start(index, values)[:3])
+        values |= {f'p1_0{suffix}': p1, f'p2_0{suffix}': p2, f'x_0{suffix}': x}
+    return Valve(values)
+
+
+def find_base(fitter: Fitter, group: Group, valve: Valve, drive: Sequence[str]) -> Valve:
+    """Find the base valve's values in one group from a grid, `drive` as measured."""
+    if group.stages == ('u-p1',) and drive == group.drive:
+        _settle_phase(fitter, group, valve)
+        phase = min(max(0.0, fitter.phase.lower), fitter.phase.upper)
+        valve = replace(valve, values={**valve.values, 'phase': phase})
+    problem = (fitter.unknowns(group), group.signal, tuple(drive))
+    points = grid(problem[0])
+    stems = STEMS if group.has_stem else ({},)
+    starts = [{**valve.values, **stem, **there} for stem in stems for there in points]
+    starts.append(dict(valve.values))
+    alone = group.stages == ('p2-x',)
+    if alone:
+        seen = fitter.bench.friction_seen(fitter.results(valve))
+        starts += [{**valve.values, **there} for there in friction_grid(seen)]
+    count = STEM_STARTS if alone else FEW_STARTS
+    found = fitter.best_of(valve, starts, problem, count)
+    if not group.has_stem:
+        return fitter.refined(found[0], problem)
+    # put to rest where it was seen to rest, a stem that slips too late is only a little wrong
+    way = eased(problem)
+    eases = found if way == problem else fitter.best_of(valve, starts, way, count)
+
+    def by_way_of_rests(each: Valve) -> Valve:
+        return fitter.fit(fitter.evolve(each, way, GENERATIONS, NARROW, COARSE), problem, SHORT)
+
+    def evolved(each: Valve) -> Valve:
+        return fitter.evolve(each, problem, GENERATIONS, NARROW, COARSE)
+
+    with ThreadPoolExecutor(os.cpu_count()) as pool:  # compiled runs release the lock
+        found = sorted([*found, *pool.map(by_way_of_rests, eases)], key=by_cost)[:FOLLOWED]
+        found += pool.map(evolved, found)
+    return fitter.refined(min(found, key=by_cost), problem)
+
+
+def _settle_phase(fitter: Fitter, group: Group, valve: Valve) -> None:
+    """Find out whether p1 answers at the sample that shows the command or at the next."""
+    best = []
+    for phase in (EARLY, LATE):
+        fitter.phase = phase
+        problem: Problem = (fitter.unknowns(group), group.signal, group.drive)
+        values = {**valve.values, 'phase': min(phase.upper, 0.0)}
+        starts = [{**values, **there} for there in grid(problem[0])]
+        best.append(fitter.best_of(valve, starts, problem, 1)[0])
+    fitter.phase = EARLY if best[0].cost <= best[1].cost else LATE
+    on_time = replace(best[0], values={**best[0].values, 'phase': 0.0})
+    results = fitter.results(on_time, (), 0.0)
+    if fitter.bench.mixed_arrivals(results):
+        fitter.bench.weigh_down(MIXED_JITTER, results)
+        fitter.phase = PHASE

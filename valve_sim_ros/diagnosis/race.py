@@ -1,0 +1,128 @@
+# Copyright 2026 The valve_sim_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The race: each candidate effect is refitted together with the base valve of its group."""
+
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+from itertools import repeat
+import os
+
+import numpy as np
+from scipy.signal import periodogram
+
+from ..model.pipeline import Array
+from .fitting import by_cost, COARSE, eased, Fitter, Problem, SCREENING, SHORT, Valve
+from .stages import Candidate, Group
+from .starts import friction_grid
+
+ROUNDS = ((40, 5), (10, 14), (4, 30))
+"""Rounds of a race where costs are rugged: how many still run, and for how many generations."""
+MOST_STARTS, FEWER_STARTS = 24, 8
+"""Up to so many starts of an effect are tried with each level of friction; if there are more, only
+so many of the best."""
+SCREENED, FINISHERS, REFINED = 3, 5, 2
+"""How many starts of a candidate are followed, runners refitted, and refined to the end."""
+
+Frictions = Sequence[dict[str, float]]
+
+
+def race(
+    fitter: Fitter,
+    group: Group,
+    valve: Valve,
+    candidates: Sequence[Candidate],
+    progress: Callable[[float], object] = lambda share: None,
+) -> list[Valve]:
+    """Return valves with one more effect, best first; the better, the more refitted."""
+    peaks: tuple[float, ...] = ()
+    frictions: Frictions = ()
+    if group.has_stem:
+        results = fitter.results(valve)
+        peaks = _peaks(fitter, np.nan_to_num(fitter.bench.residual(results, group.signal)))
+        frictions = friction_grid(fitter.bench.friction_seen(results))
+    done, total = 0, len(candidates) + FINISHERS
+
+    def count(runner: Valve) -> Valve:
+        nonlocal done
+        done += 1
+        progress(min(done / total, 1.0))
+        return runner
+
+    def screened(candidate: Candidate) -> Valve:
+        return _screened(fitter, candidate, group, valve, candidate.starts(peaks), frictions)
+
+    def evolved(runner: Valve, generations: int) -> Valve:
+        more = fitter.evolve(runner, fitter.problem(group, runner), generations)
+        return min(runner, more, key=by_cost)
+
+    def fitted(runner: Valve) -> Valve:
+        return fitter.fit(runner, fitter.problem(group, runner))
+
+    def refined(runner: Valve) -> Valve:
+        return fitter.refined(runner, fitter.problem(group, runner))
+
+    with ThreadPoolExecutor(os.cpu_count()) as pool:  # compiled runs release the lock
+        runners = sorted(map(count, pool.map(screened, candidates)), key=by_cost)
+        for left, generations in ROUNDS if group.has_stem else ():
+            first = pool.map(evolved, runners[:left], repeat(generations))
+            runners = sorted([*first, *runners[left:]], key=by_cost)
+        first = pool.map(fitted, runners[:FINISHERS])
+        runners = sorted([*map(count, first), *runners[FINISHERS:]], key=by_cost)
+        last = REFINED if group.has_stem else 0
+        return sorted([*pool.map(refined, runners[:last]), *runners[last:]], key=by_cost)
+
+
+def rebased(fitter: Fitter, group: Group, valve: Valve, runners: Sequence[Valve]) -> Valve:
+    """Return the valve without a further effect, refitted from where the runners ended."""
+    problem = fitter.problem(group, valve)
+    names = [unknown.name for unknown in problem[0]]
+    there = [
+        replace(valve, values={**valve.values, **{name: r.values[name] for name in names}})
+        for r in runners
+    ]
+    costs = [fitter.score(each, group.signal, fitter.drive, COARSE) for each in there]
+    best = there[int(np.argmin(costs))]
+    return min(valve, fitter.fit(best, problem), key=by_cost)
+
+
+def _screened(
+    fitter: Fitter,
+    candidate: Candidate,
+    group: Group,
+    valve: Valve,
+    own: Sequence[dict[str, float]],
+    frictions: Frictions,
+) -> Valve:
+    """Return the valve with one more effect after a short refit of its group."""
+    there = replace(
+        valve,
+        effects=tuple(dict.fromkeys((*valve.effects, candidate.effect))),
+        freed=(*valve.freed, *candidate.unknowns),
+        candidates=(*valve.candidates, candidate),
+    )
+    problem = fitter.problem(group, there)
+    way = eased(problem) if group.has_stem else problem
+    usual = {**candidate.neutral, **valve.values}
+    if len(own) > MOST_STARTS:
+        costs = [fitter.scan(there, [{**usual, **start}], way, SCREENING)[0].cost for start in own]
+        own = [own[index] for index in np.argsort(costs, kind='stable')[:FEWER_STARTS]]
+    starts = [[{**usual, **base, **start} for base in ({}, *frictions)] for start in own]
+
+    def best(way: Problem, count: int) -> list[Valve]:
+        each = [fitter.scan(there, some, way, SCREENING)[0] for some in starts]
+        return sorted(each, key=by_cost)[:count]
+
+    found = best(problem, SCREENED)
+    if way != problem:
+        found += [fitter.fit(each, way, SHORT, SCREENING) for each in best(way, 1)]
+    return min((fitter.fit(each, problem, SHORT, SCREENING) for each in found), key=by_cost)
+
+
+def _peaks(fitter: Fitter, residual: Array) -> tuple[float, ...]:
+    """Return the frequencies at which a residual swings most, and their neighbours [Hz]."""
+    period = float(np.median(np.diff(fitter.bench.stretches[0].time)))
+    frequency, power = periodogram(np.clip(residual, -10.0, 10.0), 1.0 / period)
+    inside = (frequency > 0.02) & (frequency < 0.45 / period)
+    tops = frequency[inside][np.argsort(-power[inside])[:3]]
+    return tuple(f + part * frequency[1] for f in tops for part in (-0.4, 0.0, 0.4))
