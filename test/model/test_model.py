@@ -156,6 +156,7 @@ def test_a_slot_takes_an_effect():
         'tubing_slot',
         'flow_slot',
         'force_slot',
+        'stride_slot',
         'motion_slot',
         'sensor_slot',
     }

@@ -8,7 +8,7 @@ from dataclasses import replace
 import os
 
 from .bench import Bench, MIXED_JITTER
-from .fitting import by_cost, COARSE, eased, Fitter, NARROW, Problem, SHORT, Valve
+from .fitting import by_cost, eased, Fitter, NARROW, Problem, SHORT, Valve
 from .stages import Group
 from .starts import friction_grid, grid, START, STEMS
 from .unknowns import EARLY, LATE, PHASE
@@ -53,10 +53,10 @@ def find_base(fitter: Fitter, group: Group, valve: Valve, drive: Sequence[str]) 
     eases = found if way == problem else fitter.best_of(valve, starts, way, count)
 
     def by_way_of_rests(each: Valve) -> Valve:
-        return fitter.fit(fitter.evolve(each, way, GENERATIONS, NARROW, COARSE), problem, SHORT)
+        return fitter.fit(fitter.evolve(each, way, GENERATIONS, NARROW), problem, SHORT)
 
     def evolved(each: Valve) -> Valve:
-        return fitter.evolve(each, problem, GENERATIONS, NARROW, COARSE)
+        return fitter.evolve(each, problem, GENERATIONS, NARROW)
 
     with ThreadPoolExecutor(os.cpu_count()) as pool:  # compiled runs release the lock
         found = sorted([*found, *pool.map(by_way_of_rests, eases)], key=by_cost)[:FOLLOWED]
@@ -75,7 +75,7 @@ def _settle_phase(fitter: Fitter, group: Group, valve: Valve) -> None:
         best.append(fitter.best_of(valve, starts, problem, 1)[0])
     fitter.phase = EARLY if best[0].cost <= best[1].cost else LATE
     on_time = replace(best[0], values={**best[0].values, 'phase': 0.0})
-    results = fitter.results(on_time, (), 0.0)
+    results = fitter.results(on_time, ())
     if fitter.bench.mixed_arrivals(results):
         fitter.bench.weigh_down(MIXED_JITTER, results)
         fitter.phase = PHASE

@@ -76,7 +76,6 @@ class Bench:
         values: Mapping[str, float],
         effects: Sequence[str] = (),
         drive: Sequence[str] = (),
-        coarse: float = 0.0,
     ) -> list[Array]:
         """Return p1, p2, x of a valve, and 1 where a slip's moment is in doubt: (4, n) each.
 
@@ -90,12 +89,10 @@ class Bench:
         drive : sequence of str
             Signals that later stages receive as measured; with x, the stem is put where it was
             seen to rest, so that a slip missed by the model does not spoil the next one.
-        coarse : float
-            Take steps of up to this length [s] even where the effects ask for shorter ones.
         """
         results = []
         for index in range(len(self.stretches)):
-            outputs, grid, _ = self._run(index, values, effects, drive, coarse, 'x', math.inf)
+            outputs, grid, _ = self._run(index, values, effects, drive, 'x', math.inf)
             results.append(outputs[:, grid.rows])
         return results
 
@@ -105,7 +102,6 @@ class Bench:
         effects: Sequence[str],
         signal: str,
         drive: Sequence[str] = (),
-        coarse: float = 0.0,
         bound: float = math.inf,
     ) -> float:
         """Return the robust sum of squares of a signal over its noise, or more than `bound`."""
@@ -113,7 +109,7 @@ class Bench:
         for index in range(len(self.stretches)):
             if score <= bound:
                 left = bound - score
-                score += self._run(index, values, effects, drive, coarse, signal, left)[2]
+                score += self._run(index, values, effects, drive, signal, left)[2]
         return score
 
     def _run(
@@ -122,7 +118,6 @@ class Bench:
         values: Mapping[str, float],
         effects: Sequence[str],
         drive: Sequence[str],
-        coarse: float,
         signal: str,
         bound: float,
     ) -> tuple[Array, Grid, float]:
@@ -136,7 +131,7 @@ class Bench:
             grid.dt,
             self.start(index, values),
             theta,
-            max(composition.finest, coarse),
+            composition.finest,
             composition.effects,
             np.zeros(composition.memory_size),
             grid.forced,

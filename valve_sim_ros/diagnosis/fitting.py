@@ -19,8 +19,6 @@ HOPELESS = 1e3
 """Residual of a run that is not finite [noise]."""
 SHORT = 4
 """Steps of a descent that only shows where it leads."""
-SCREENING, COARSE = 0.1, 0.04
-"""Steps inside a sample while candidates are screened, and fitted [s]."""
 SPREAD, NARROW = 5.0, 3.0
 """Standard deviation with which an evolution begins, and near an optimum [steps of unknowns]."""
 POPULATION = 14
@@ -65,22 +63,19 @@ class Fitter:
         """Return what a fit of the base valve varies in a group."""
         return group.unknowns(len(self.bench.stretches), self.phase)
 
-    def results(
-        self, valve: Valve, drive: Sequence[str] | None = None, coarse: float = COARSE
-    ) -> list[Array]:
+    def results(self, valve: Valve, drive: Sequence[str] | None = None) -> list[Array]:
         """Return what `Bench.run` makes of a valve, driven as is usual here unless told."""
         driven = self.drive if drive is None else drive
-        return self.bench.run(complete(valve.values), valve.effects, driven, coarse)
+        return self.bench.run(complete(valve.values), valve.effects, driven)
 
     def residuals(
         self,
         valve: Valve,
         signal: str,
         drive: Sequence[str] | None = None,
-        coarse: float = COARSE,
     ) -> Array:
         """Return the residuals of a signal over its noise, 0 where they do not count."""
-        results = self.results(valve, drive, coarse)
+        results = self.results(valve, drive)
         residual = np.nan_to_num(self.bench.residual(results, signal))
         if not all(np.isfinite(each).all() for each in results):
             residual[:] = HOPELESS  # a run that blew up must not look like one that fits
@@ -91,26 +86,23 @@ class Fitter:
         valve: Valve,
         signal: str,
         drive: Sequence[str] = (),
-        coarse: float = 0.0,
         bound: float = math.inf,
     ) -> float:
         """Return the robust sum of squares of a signal over its noise, or more than `bound`."""
-        score = self.bench.score(
-            complete(valve.values), valve.effects, signal, drive, coarse, bound
-        )
+        score = self.bench.score(complete(valve.values), valve.effects, signal, drive, bound)
         return score if math.isfinite(score) else math.inf
 
-    def fit(self, valve: Valve, problem: Problem, most: int = 20, coarse: float = COARSE) -> Valve:
+    def fit(self, valve: Valve, problem: Problem, most: int = 20) -> Valve:
         """Return the valve at the bottom of the valley in which it stands."""
         unknowns, signal, drive = problem
 
         def residuals(point: Array) -> Array:
             there = replace(valve, values=to_values(unknowns, point, valve.values))
-            return self.residuals(there, signal, drive, coarse)
+            return self.residuals(there, signal, drive)
 
         def score(point: Array, bound: float) -> float:
             there = replace(valve, values=to_values(unknowns, point, valve.values))
-            return self.score(there, signal, drive, coarse, bound)
+            return self.score(there, signal, drive, bound)
 
         found = descend(residuals, to_point(unknowns, valve.values), most)
         if most > SHORT:
@@ -125,14 +117,13 @@ class Fitter:
         problem: Problem,
         generations: int,
         spread: float = SPREAD,
-        coarse: float = SCREENING,
     ) -> Valve:
         """Return the best valve that evolution finds around this one."""
         unknowns, signal, drive = problem
 
         def score(point: Array, bound: float) -> float:
             there = replace(valve, values=to_values(unknowns, point, valve.values))
-            return self.score(there, signal, drive, coarse, bound)
+            return self.score(there, signal, drive, bound)
 
         found = evolve(
             score,
@@ -150,7 +141,7 @@ class Fitter:
         """Return a valve after descents and, where costs are rugged, evolutions in turn."""
         valve = self.fit(valve, problem)
         while 'f_s' in (unknown.name for unknown in problem[0]):
-            more = self.evolve(valve, problem, 40, NARROW, COARSE)
+            more = self.evolve(valve, problem, 40, NARROW)
             more = self.fit(more, problem)
             if more.cost > 0.99 * valve.cost:
                 return min(valve, more, key=by_cost)
@@ -167,11 +158,10 @@ class Fitter:
         starts: Sequence[Mapping[str, float]],
         problem: Problem,
         count: int,
-        coarse: float = COARSE,
     ) -> list[Valve]:
         """Try starts, descend a little from the best of them, and order what comes out."""
-        tried = self.scan(valve, starts, problem, coarse, count)
-        fits = [self.fit(there, problem, SHORT, coarse) for there in tried]
+        tried = self.scan(valve, starts, problem, count)
+        fits = [self.fit(there, problem, SHORT) for there in tried]
         return sorted(fits, key=by_cost)
 
     def scan(
@@ -179,7 +169,6 @@ class Fitter:
         valve: Valve,
         starts: Sequence[Mapping[str, float]],
         problem: Problem,
-        coarse: float,
         count: int = 1,
     ) -> list[Valve]:
         """Return the best starts, best first."""
@@ -188,7 +177,7 @@ class Fitter:
         bound = math.inf
         for start in starts:
             there = replace(valve, values=start)
-            cost = self.score(there, signal, drive, coarse, bound)
+            cost = self.score(there, signal, drive, bound)
             tried = sorted([*tried, replace(there, cost=cost)], key=by_cost)[:count]
             bound = tried[-1].cost if len(tried) == count else math.inf
         return tried

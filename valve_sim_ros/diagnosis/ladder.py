@@ -10,7 +10,7 @@ from typing import Literal
 from . import odds
 from .adequacy import Leftover, leftover
 from .base_valve import find_base
-from .fitting import COARSE, Fitter, Valve
+from .fitting import Fitter, Valve
 from .race import race, rebased
 from .stages import Candidate, Group
 
@@ -117,7 +117,7 @@ def climb(
     complete = False
 
     def seen(there: Valve) -> tuple[Valve, Leftover]:
-        cost = fitter.score(there, group.signal, fitter.drive, COARSE)
+        cost = fitter.score(there, group.signal, fitter.drive)
         return replace(there, cost=cost), leftover(fitter.residuals(there, group.signal))
 
     def worth(left: Leftover) -> bool:

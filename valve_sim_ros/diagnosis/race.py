@@ -12,7 +12,7 @@ import numpy as np
 from scipy.signal import periodogram
 
 from ..model.pipeline import Array
-from .fitting import by_cost, COARSE, eased, Fitter, Problem, SCREENING, SHORT, Valve
+from .fitting import by_cost, eased, Fitter, Problem, SHORT, Valve
 from .stages import Candidate, Group
 from .starts import friction_grid
 
@@ -81,7 +81,7 @@ def rebased(fitter: Fitter, group: Group, valve: Valve, runners: Sequence[Valve]
         replace(valve, values={**valve.values, **{name: r.values[name] for name in names}})
         for r in runners
     ]
-    costs = [fitter.score(each, group.signal, fitter.drive, COARSE) for each in there]
+    costs = [fitter.score(each, group.signal, fitter.drive) for each in there]
     best = there[int(np.argmin(costs))]
     return min(valve, fitter.fit(best, problem), key=by_cost)
 
@@ -105,18 +105,18 @@ def _screened(
     way = eased(problem) if group.has_stem else problem
     usual = {**candidate.neutral, **valve.values}
     if len(own) > MOST_STARTS:
-        costs = [fitter.scan(there, [{**usual, **start}], way, SCREENING)[0].cost for start in own]
+        costs = [fitter.scan(there, [{**usual, **start}], way)[0].cost for start in own]
         own = [own[index] for index in np.argsort(costs, kind='stable')[:FEWER_STARTS]]
     starts = [[{**usual, **base, **start} for base in ({}, *frictions)] for start in own]
 
     def best(way: Problem, count: int) -> list[Valve]:
-        each = [fitter.scan(there, some, way, SCREENING)[0] for some in starts]
+        each = [fitter.scan(there, some, way)[0] for some in starts]
         return sorted(each, key=by_cost)[:count]
 
     found = best(problem, SCREENED)
     if way != problem:
-        found += [fitter.fit(each, way, SHORT, SCREENING) for each in best(way, 1)]
-    return min((fitter.fit(each, problem, SHORT, SCREENING) for each in found), key=by_cost)
+        found += [fitter.fit(each, way, SHORT) for each in best(way, 1)]
+    return min((fitter.fit(each, problem, SHORT) for each in found), key=by_cost)
 
 
 def _peaks(fitter: Fitter, residual: Array) -> tuple[float, ...]:

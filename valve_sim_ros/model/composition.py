@@ -24,9 +24,13 @@ class Place(NamedTuple):
     memory: int
 
 
+STRIDE = 0
+"""Where the longest step of a moving stem is kept, before all flags."""
+
+
 def _places() -> tuple[dict[str, Place], int, int]:
     """Lay all effects out one after the other."""
-    places, flag, memory = {}, 0, 0
+    places, flag, memory = {}, STRIDE + 1, 0
     for effect in CATALOGUE.values():
         places[effect.id] = Place(flag, memory)
         flag += 1 + len(effect.parameters)
@@ -47,13 +51,15 @@ class Composition(NamedTuple):
 
 def compose(active: Iterable[str], values: Mapping[str, float]) -> Composition:
     """Return the effects in force with their parameters by full name."""
-    effects, finest = np.zeros(EFFECTS_SIZE), BASE_STEP
+    effects, finest, stride = np.zeros(EFFECTS_SIZE), BASE_STEP, BASE_STEP
     for name in active:
         effect, flag = CATALOGUE[name], PLACES[name].flag
         effects[flag] = 1.0
         for offset, parameter in enumerate(effect.parameters, 1):
             effects[flag + offset] = values[f'{name}.{parameter.name}']
         finest = min(finest, effect.longest_step)
+        stride = min(stride, effect.stride)
+    effects[STRIDE] = stride
     return Composition(effects, MEMORY_SIZE, finest)
 
 
@@ -64,6 +70,8 @@ def slot_function(slot: str) -> Any:
         key=lambda effect: (effect.order, effect.id),
     )
     lines = [f'def {slot}(value, state, effects, memory, dt):']
+    if slot == 'stride_slot':
+        lines.append(f'    value = min(value, effects[{STRIDE}])')
     space: dict[str, Any] = {}
     for effect in filling:
         space[effect.id] = effect.slots[slot]

@@ -150,6 +150,8 @@ class Effect:
         Numbers it must remember from sample to sample.
     longest_step : float
         Longest step inside a sample for which its form is accurate [s].
+    stride : float
+        The same while the stem moves [s].
     order : int
         Place along the signal path among the effects of one slot.
     twins : mapping of str to str
@@ -170,6 +172,7 @@ class Effect:
     confirm: str
     memory: int = 0
     longest_step: float = math.inf
+    stride: float = math.inf
     order: int = 0
     twins: Mapping[str, str] = field(default_factory=dict)
     variants: tuple[tuple[str, ...], ...] = ()

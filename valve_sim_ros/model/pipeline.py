@@ -130,6 +130,8 @@ flow_slot = unchanged
 """(target [% of span], rate [1/s]) of p2: leak, volume, nonlinear flow, quick exhaust."""
 force_slot = unchanged
 """(opening force offset [% of span], Friction): spring, friction and fluid effects."""
+stride_slot = unchanged
+"""Longest step while the stem moves [s]: friction that follows its speed or its place."""
 motion_slot = unchanged
 """Motion after each step: stops, limits of speed, what the moved stem does to the chamber."""
 sensor_slot = unchanged
@@ -160,6 +162,60 @@ def transition_over(dt: float, theta: Theta, finest: float) -> Transition:
         phi1,
         phi2,
     )
+
+
+@njit(forceinline=True)
+def pushed(
+    inlet: float,
+    lag: Lag,
+    state: State,
+    theta: Theta,
+    transition: Transition,
+    effects: Any,
+    memory: Any,
+) -> Motion:
+    """Return what chamber and stem do in one step, before the effects on their motion.
+
+    Parameters
+    ----------
+    inlet : float
+        p1 as the chamber sees it [% of span].
+    lag : Lag
+        Of the chamber over the step.
+    state, theta, transition, effects, memory
+        As in `advance`.
+    """
+    dt = transition.step
+    target, rate = flow_slot((inlet, lag.rate), state, effects, memory, dt)
+    offset, friction = force_slot(
+        (0.0, Friction(theta.f_s, theta.f_s, theta.f_d, theta.f_d, 1.0)),
+        state,
+        effects,
+        memory,
+        dt,
+    )
+    poles, phi1, phi2 = transition.poles, transition.phi1, transition.phi2
+    if rate != lag.rate or friction.stiffness != 1.0:
+        lag = lag_over(rate, dt, theta.a_1, theta.a_2, friction.stiffness)
+    if friction.stiffness != 1.0:
+        poles = stem_poles(theta.a_1 * friction.stiffness, theta.a_2)
+        phi1, phi2 = free_motion(dt, poles)
+    excess = state.p2 - target
+    stem = stem_step(
+        Stem(state.x, state.v, state.direction, state.armed != 0.0),
+        target + offset,
+        excess,
+        dt,
+        friction,
+        theta.delta,
+        (lag.gain, lag.stem_rate),
+        poles,
+        lag.decay,
+        phi1,
+        phi2,
+    )
+    p2 = chamber_pressure(state.p2, target, lag.decay)
+    return Motion(stem, p2, target + offset, excess, rate, friction, theta)
 
 
 @njit(forceinline=True)
@@ -200,36 +256,23 @@ def advance(
     inlet = tubing_slot(state.p1, state, effects, memory, dt)
     filling = is_filling(inlet, p1, state.p2, theta.printed != 0.0)
     lag = transition.filling if filling else transition.emptying
-    target, rate = flow_slot((inlet, lag.rate), state, effects, memory, dt)
-    offset, friction = force_slot(
-        (0.0, Friction(theta.f_s, theta.f_s, theta.f_d, theta.f_d, 1.0)),
-        state,
-        effects,
-        memory,
-        dt,
-    )
-    poles, phi1, phi2 = transition.poles, transition.phi1, transition.phi2
-    if rate != lag.rate or friction.stiffness != 1.0:
-        lag = lag_over(rate, dt, theta.a_1, theta.a_2, friction.stiffness)
-        poles = stem_poles(theta.a_1 * friction.stiffness, theta.a_2)
-        phi1, phi2 = free_motion(dt, poles)
-    excess = state.p2 - target
-    stem = stem_step(
-        Stem(state.x, state.v, state.direction, state.armed != 0.0),
-        target + offset,
-        excess,
-        dt,
-        friction,
-        theta.delta,
-        (lag.gain, lag.stem_rate),
-        poles,
-        lag.decay,
-        phi1,
-        phi2,
-    )
-    p2 = chamber_pressure(state.p2, target, lag.decay)
-    motion = Motion(stem, p2, target + offset, excess, rate, friction, theta)
-    stem, p2 = motion_slot(motion, state, effects, memory, dt)[:2]
+    step, now, left = transition, state, 1
+    while True:
+        motion = pushed(inlet, lag, now, theta, step, effects, memory)
+        if step.step == dt and (motion.stem.direction != 0.0 or motion.stem.x != state.x):
+            longest = stride_slot(dt, state, effects, memory, dt)
+            if longest < dt:  # again, in short steps
+                left = math.ceil(dt / longest)
+                step = transition_over(dt / left, theta, BASE_STEP)
+                lag = step.filling if filling else step.emptying
+                continue
+        stem, p2 = motion_slot(motion, now, effects, memory, step.step)[:2]
+        left -= 1
+        if left == 0:
+            break
+        armed = 1.0 if stem.armed else 0.0
+        time = now.time + step.step
+        now = State(now.p1, p2, stem.x, stem.v, stem.direction, armed, now.play, now.command, time)
     armed = 1.0 if stem.armed else 0.0
     time = state.time + dt
     after = State(p1, p2, stem.x, stem.v, stem.direction, armed, play, u, time)
@@ -246,9 +289,11 @@ def advance_sample(
     memory: Any,
 ) -> tuple[State, float]:
     """Take the valve through one sample of `transition.dt` seconds; see `advance`."""
-    for _ in range(transition.substeps - 1):
-        state = advance(state.command, state, theta, transition, effects, memory)[0]
-    return advance(u, state, theta, transition, effects, memory)
+    x = state.x
+    for left in range(transition.substeps, 0, -1):
+        command = u if left == 1 else state.command
+        state, x = advance(command, state, theta, transition, effects, memory)
+    return state, x
 
 
 @njit(forceinline=True)

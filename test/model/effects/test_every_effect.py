@@ -178,3 +178,16 @@ def test_stem_stays_inside_the_stops():
     s = simulate(commands(), parameters=spec, initial=InitialState(50.0, 50.0, 50.0))
     assert s.x.min() >= 10.0
     assert s.x.max() == 70.0
+
+
+@every_effect
+def test_a_sample_is_as_good_as_many_short_ones(effect):
+    time = 0.2 * np.arange(750)
+    slow = 50.0 + 30.0 * np.sin(2.0 * np.pi * time / 60.0)
+    u = np.concatenate([slow, commands(400)])
+    spec, start = with_effect(effect), InitialState(*[u[0]] * 3)
+    one = simulate(u, parameters=spec, initial=start)
+    many = simulate(np.repeat(u, 400), parameters=spec, initial=start, sample_time=5e-4)
+    for name, most in (('p1', 0.05), ('p2', 0.05), ('x', 0.2)):
+        apart = np.abs(getattr(one, name) - getattr(many, name)[::400])
+        assert np.mean(apart > most) < 0.02, name

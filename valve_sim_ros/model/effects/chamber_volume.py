@@ -22,10 +22,12 @@ def flow(value: Any, state: Any, p: Any, memory: Any, dt: float) -> tuple[float,
 
 @njit
 def motion(value: Any, state: Any, p: Any, memory: Any, dt: float) -> Motion:
-    """Let the displaced volume change p2, isothermally."""
+    """Let the displaced volume change p2, isothermally; half a step ahead, as p2 acts late."""
     ratio, displacement = p
-    before = max(1.0 + ratio * state.x / 100.0, 0.05)
-    after = max(1.0 + ratio * value.stem.x / 100.0, 0.05)
+    lead = 0.5 * dt * value.stem.v
+    before = max(1.0 + ratio * (state.x + memory[0]) / 100.0, 0.05)
+    after = max(1.0 + ratio * (value.stem.x + lead) / 100.0, 0.05)
+    memory[0] = lead
     change = (value.p2 + ABSOLUTE) * (before / after - 1.0)
     return moved(value, value.stem, value.p2 + displacement * change)
 
@@ -60,7 +62,8 @@ EFFECT = Effect(
         ),
     ),
     slots={'flow_slot': flow, 'motion_slot': motion},
-    longest_step=0.01,
+    memory=1,
+    stride=0.005,
     order=10,
     variants=(('ratio',), ('ratio', 'displacement')),
     explanation='The opening stem enlarges the chamber, so the same flow raises p2 more slowly.',

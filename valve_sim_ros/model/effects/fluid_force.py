@@ -74,7 +74,7 @@ EFFECT = Effect(
         ),
     ),
     slots={'force_slot': force},
-    longest_step=0.04,
+    stride=0.04,
     order=80,
     explanation='The pressure drop over the plug pushes it, most near the seat.',
     symptom='x over p2 is shifted near the seat and less so when open.',

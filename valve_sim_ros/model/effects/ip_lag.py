@@ -15,9 +15,18 @@ def inlet(value: float, state: Any, p: Any, memory: Any, dt: float) -> float:
     """Return p1 on its way to what the converter asked for since the last step."""
     if state.time + dt == 0.0:
         memory[0], memory[1] = state.p1, value
-    memory[0] = lagged(memory[0], memory[1], p[0], dt)
+    before = memory[0]
+    memory[0] = lagged(before, memory[1], p[0], dt)
+    # the chamber is given the mean over the step
+    memory[2] = memory[1] - before + p[0] / dt * (before - memory[0]) if dt > 0.0 else 0.0
     memory[1] = value
     return memory[0]
+
+
+@njit
+def tubing(value: float, state: Any, p: Any, memory: Any, dt: float) -> float:
+    """Return the mean of p1 over the step, `value` at its start."""
+    return value + memory[2]
 
 
 EFFECT = Effect(
@@ -37,8 +46,8 @@ EFFECT = Effect(
             starts=(0.2, 0.7, 2.0),
         ),
     ),
-    slots={'inlet_slot': inlet},
-    memory=2,
+    slots={'inlet_slot': inlet, 'tubing_slot': tubing},
+    memory=3,
     longest_step=0.1,
     order=30,
     explanation='The converter fills its outlet through a restriction, so p1 follows u gradually.',

@@ -81,7 +81,7 @@ EFFECT = Effect(
         ),
     ),
     slots={'force_slot': force},
-    longest_step=0.04,
+    stride=0.02,
     order=10,
     variants=(('slope',), ('height', 'centre', 'width')),
     explanation='Scoring, deposits or a bent stem make some places of the stroke stiffer.',

@@ -13,7 +13,7 @@ from ..declarations import Effect, EffectParameter
 def command(value: float, state: Any, p: Any, memory: Any, dt: float) -> float:
     """Return the output of a PI controller of the stem position, u + K (u - x) + I."""
     gain, integral_gain, overdrive = p
-    error = value - state.x
+    error = value - (state.x + dt * state.v)  # at the end of the step
     raised = value + gain * error + memory[0]
     low, high = -overdrive, 100.0 + overdrive
     if low < raised < high or (raised <= low) == (error > 0.0):  # no wind-up
@@ -64,7 +64,7 @@ EFFECT = Effect(
     ),
     slots={'command_slot': command},
     memory=1,
-    longest_step=0.04,
+    longest_step=0.01,
     order=0,
     variants=(('gain',), ('gain', 'integral_gain'), ('gain', 'integral_gain', 'overdrive')),
     explanation='A positioner compares the stem with the command and drives the converter harder.',

@@ -3,42 +3,90 @@
 """Elastic motion of the stem below breakaway (LuGre bristles)."""
 
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 from numba import njit
 
 from ..declarations import Effect, EffectParameter
 from ..pipeline import Motion, moved
-from ..stem import Stem
+from ..stem import Friction, Stem
 
 DROP = 1.0
 """Speed at which bristle friction has fallen from f_s to f_d [%/s]."""
-INERTIA, DAMPING = 2000.0, 176.0
-"""k/m [1/s^2] and F_v/m [1/s] of the source paper; only their ratio is visible in a record."""
+STIFFEST = 200.0
+"""Bristles are not stiffer than this, relative to the spring: their travel is then not seen."""
+HEAVIEST, FASTEST = 4000.0, 500.0
+"""Bounds of k/m [1/s^2] and F_v/m [1/s]: beyond them only their ratio is visible in a record."""
+STEP, STABLE = 0.008, 2.0
+"""Longest step [s], and longest step times the fastest rate."""
+SLOW, FAST = 1e-3, 6.0
+"""Speeds below which all of f_s - f_d is left, and beyond which nothing [DROP]."""
+
+
+class Bristles(NamedTuple):
+    """Constants of the stem on its bristles.
+
+    k/m [1/s^2], F_v/m [1/s], stiffness and damping [s] of the bristles relative to the spring, and
+    friction.
+    """
+
+    inertia: float
+    damping: float
+    stiffness: float
+    bristle_damping: float
+    friction: Friction
 
 
 @njit
 def motion(value: Any, state: Any, p: Any, memory: Any, dt: float) -> Motion:
-    """Replace the step of the stem by a linearly implicit one with bristles."""
-    f = value.friction
-    stiffness = 1.0 / max(p[0], 1e-4)
-    middle = value.target + value.excess * math.exp(-0.5 * value.rate * dt)
+    """Replace the step of the stem by short ones with bristles (classical Runge-Kutta)."""
+    if p[0] <= 0.0:
+        return value
+    friction, theta = value.friction, value.theta
+    stiffness = min(1.0 / p[0], STIFFEST)
+    inertia = min(theta.a_1, HEAVIEST, FASTEST * theta.a_1 / theta.a_2)
+    damping = inertia * theta.a_2 / theta.a_1
+    omega = math.sqrt(inertia * stiffness)
+    b = Bristles(inertia, damping, stiffness, 2.0 * stiffness / omega, friction)
     x, v, z = state.x, state.v, memory[0]
-    damping = 2.0 * math.sqrt(stiffness / INERTIA)
+    if state.time == 0.0:
+        force = value.target + value.excess - friction.stiffness * x
+        z = min(max(force, -friction.static_down), friction.static_up) / stiffness
+    count = math.ceil(dt / min(STEP, STABLE / (damping + 2.0 * omega)))
+    h = dt / max(count, 1)
+    half_decay = math.exp(-0.5 * value.rate * h)
+    now = value.excess
+    for _ in range(count):
+        middle = now * half_decay
+        end = middle * half_decay
+        a1, z1 = rates(value.target + now, x, v, z, b)
+        v2 = v + 0.5 * h * a1
+        a2, z2 = rates(value.target + middle, x + 0.5 * h * v, v2, z + 0.5 * h * z1, b)
+        v3 = v + 0.5 * h * a2
+        a3, z3 = rates(value.target + middle, x + 0.5 * h * v2, v3, z + 0.5 * h * z2, b)
+        v4 = v + h * a3
+        a4, z4 = rates(value.target + end, x + h * v3, v4, z + h * z3, b)
+        x += h / 6.0 * (v + 2.0 * (v2 + v3) + v4)
+        v += h / 6.0 * (a1 + 2.0 * (a2 + a3) + a4)
+        z += h / 6.0 * (z1 + 2.0 * (z2 + z3) + z4)
+        now = end
+    memory[0] = z
+    return moved(value, Stem(x, v, 0.0, False), value.p2)
+
+
+@njit(forceinline=True)
+def rates(p2: float, x: float, v: float, z: float, b: Bristles) -> tuple[float, float]:
+    """Return the rates of the stem's speed [%/s^2] and of the bristles [%/s]."""
+    f = b.friction
     static, dynamic = (f.static_up, f.dynamic_up) if v >= 0.0 else (f.static_down, f.dynamic_down)
     ratio = v / DROP
-    level = dynamic + (static - dynamic) * math.exp(-ratio * ratio) + 1e-6
-    if state.time == 0.0:
-        force = min(max(middle - f.stiffness * x, -f.static_down), f.static_up)
-        z = force / stiffness
-    alpha = 1.0 / (1.0 + dt * stiffness * abs(v) / level)
-    bristles = stiffness * alpha * z + (damping * (alpha - 1.0) * z / dt if dt > 0.0 else 0.0)
-    push = v + dt * INERTIA * (middle - f.stiffness * x - bristles)
-    brake = dt * (f.stiffness + stiffness * alpha) + damping * alpha + DAMPING / INERTIA
-    v = push / (1.0 + dt * INERTIA * brake)
-    memory[0] = alpha * (z + dt * v)
-    stem = Stem(x + dt * v, v, 0.0, False)
-    return moved(value, stem, value.p2)
+    level = dynamic + 1e-6
+    if abs(ratio) < FAST:
+        fall = math.exp(-ratio * ratio) if abs(ratio) > SLOW else 1.0
+        level += (static - dynamic) * fall
+    slope = v - b.stiffness * abs(v) * z / level
+    force = p2 - f.stiffness * x - b.stiffness * z - b.bristle_damping * slope
+    return b.inertia * force - b.damping * v, slope
 
 
 EFFECT = Effect(
@@ -60,7 +108,6 @@ EFFECT = Effect(
     ),
     slots={'motion_slot': motion},
     memory=1,
-    longest_step=0.004,
     order=-10,
     explanation='The packing gives way elastically before the stem breaks away.',
     symptom='Micro-motion below f_s, minor loops, and no clean stick.',

@@ -85,7 +85,7 @@ EFFECT = Effect(
         ),
     ),
     slots={'flow_slot': flow, 'motion_slot': motion},
-    longest_step=0.1,
+    stride=0.02,
     order=40,
     variants=(('pressure_rate',), ('opening_rate', 'closing_rate')),
     explanation='A restriction, a damper or a small booster limits how fast p2 or the stem moves.',

@@ -56,7 +56,7 @@ EFFECT = Effect(
         ),
     ),
     slots={'force_slot': force},
-    longest_step=0.04,
+    stride=0.04,
     order=70,
     variants=(('hardening',), ('bow',)),
     explanation='Coils close up, or the effective area of the diaphragm changes along the stroke.',

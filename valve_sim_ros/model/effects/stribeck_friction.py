@@ -3,110 +3,115 @@
 """Friction that falls gradually with the stem's speed."""
 
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 from numba import njit
 
 from ..declarations import Effect, EffectParameter
-from ..pipeline import Motion, moved
-from ..stem import (
-    begin_slip,
-    forced_gain,
-    free_motion,
-    Friction,
-    slip_speed,
-    Stem,
-    stem_poles,
-    stem_step,
-)
+from ..pipeline import Motion, moved, Theta
+from ..stem import Friction, Stem
 
-MOST_STEPS = 100
+STEP, STABLE = 0.002, 0.4
+"""Longest step [s], and longest step times the fastest rate of the stem."""
+CALM, STEADY = 4, 0.003
+"""How much longer steps are while a short one changes the speed by no more than this part."""
+FAST = 5.0
+"""Speed beyond which nothing of f_s - f_d is left [v_s]."""
+
+
+class Slipping(NamedTuple):
+    """A stem that slips: direction, k/m [1/s^2], F_v/m [1/s], stiffness, levels [%], v_s [%/s]."""
+
+    direction: float
+    a_1: float
+    a_2: float
+    stiffness: float
+    level: float
+    rise: float
+    fall: float
 
 
 @njit
 def motion(value: Any, state: Any, p: Any, memory: Any, dt: float) -> Motion:
-    """Repeat the step with the friction that belongs to the speed at its end.
+    """Repeat the step, if the stem moves in it, with friction that follows its speed.
 
-    Friction that falls with speed feeds itself: taken from the speed at the start of the step, the
-    stem would break away too late. With friction f over the step the speed at its end is
-    linear in f, so the speed solves speed + gain * friction(speed) = free.
+    Classical Runge-Kutta in short steps: friction that falls with speed feeds itself, and a train
+    of slips remembers every error.
     """
-    f, theta = value.friction, value.theta
-    still = state.direction == 0.0
-    if p[0] <= 0.0 or dt == 0.0 or (still and value.stem.direction == 0.0):
+    moves = state.direction != 0.0 or value.stem.direction != 0.0 or value.stem.x != state.x
+    if p[0] <= 0.0 or dt == 0.0 or not moves:
         return value
-    direction = value.stem.direction if still else state.direction
-    level, rise = f.dynamic_up, f.static_up - f.dynamic_up
-    if direction < 0.0:
-        level, rise = f.dynamic_down, f.static_down - f.dynamic_down
-    poles = stem_poles(theta.a_1 * f.stiffness, theta.a_2)
-    phi1, phi2 = free_motion(dt, poles)
-    forced = forced_gain(value.rate, theta.a_1, theta.a_2, f.stiffness)
-    decay = math.exp(-value.rate * dt)
-    start = Stem(state.x, state.v, direction, state.armed != 0.0)
-    smooth = begin_slip(
-        start, value.target, value.excess, Friction(0.0, 0.0, 0.0, 0.0, f.stiffness), forced, poles
-    )
-    braked = begin_slip(
-        start, value.target, value.excess, Friction(0.0, 0.0, 1.0, 1.0, f.stiffness), forced, poles
-    )
-    free = direction * slip_speed(smooth, decay, phi1, phi2)
-    gain = free - direction * slip_speed(braked, decay, phi1, phi2)
-    speed = settled(direction * state.v, free - gain * level, gain * rise, p[0])
-    drop = rise * math.exp(-((speed / p[0]) ** 2))
-    stem = stem_step(
-        Stem(state.x, state.v, state.direction, state.armed != 0.0),
-        value.target,
-        value.excess,
-        dt,
-        Friction(f.static_up, f.static_down, level + drop, level + drop, f.stiffness),
-        theta.delta,
-        forced,
-        poles,
-        decay,
-        phi1,
-        phi2,
-    )
+    f, theta = value.friction, value.theta
+    fastest = max(theta.a_2, math.sqrt(theta.a_1 * f.stiffness))
+    left = math.ceil(dt / min(STEP, STABLE / fastest))
+    short = dt / left
+    decay = math.exp(-value.rate * short)
+    stem = Stem(state.x, state.v, state.direction, state.armed != 0.0)
+    slip = slipping(stem.direction, f, theta, p[0])
+    end = value.target + value.excess
+    calm = False
+    while left > 0:
+        count = CALM if calm and left >= CALM else 1
+        begin, h = end, count * short
+        end = value.target + (begin - value.target) * (decay**CALM if count == CALM else decay)
+        left -= count
+        if stem.direction == 0.0:
+            spring = f.stiffness * stem.x
+            up, down = spring + f.static_up, spring - f.static_down
+            if down <= end <= up:
+                continue
+            level = up if end > up else down
+            if down <= begin <= up:  # it breaks away within the step
+                h *= (end - level) / (end - begin)
+                begin = level
+            stem = Stem(stem.x, 0.0, 1.0 if end > up else -1.0, False)
+            slip = slipping(stem.direction, f, theta, p[0])
+        speed = stem.v
+        stem = slipped(stem, begin, end, h, slip, theta.delta)
+        calm = abs(stem.v - speed) < STEADY * count * abs(speed)
     return moved(value, stem, value.p2)
 
 
 @njit
-def settled(speed: float, free: float, drop: float, fall: float) -> float:
-    """Return the speed w that the stem comes to: w + drop exp(-(w / fall)^2) = free.
-
-    Parameters
-    ----------
-    speed : float
-        Where it starts, in the direction of the slip [%/s].
-    free, drop : float
-        Speed at the end of the step without Stribeck friction, and what that takes off [%/s].
-    fall : float
-        Speed at which friction falls [%/s].
-    """
-    near = far = max(speed, 0.0)
-    faster = excess_drag(near, free, drop, fall) < 0.0
-    for _ in range(MOST_STEPS):  # from the start, so that of several roots the first is met
-        near = far
-        stride = max(0.15 * fall, 0.3 * (near - 2.0 * fall))
-        far = min(near + stride, free) if faster else max(near - stride, 0.0)
-        if far == near or (excess_drag(far, free, drop, fall) < 0.0) != faster:
-            break
-    for _ in range(MOST_STEPS):
-        if abs(far - near) <= 1e-6 * (fall + far):
-            break
-        middle = 0.5 * (near + far)
-        if (excess_drag(middle, free, drop, fall) < 0.0) == faster:
-            near = middle
-        else:
-            far = middle
-    return far
+def slipping(direction: float, f: Friction, theta: Theta, fall: float) -> Slipping:
+    """Return the constants of a slip."""
+    level, rise = f.dynamic_up, f.static_up - f.dynamic_up
+    if direction < 0.0:
+        level, rise = f.dynamic_down, f.static_down - f.dynamic_down
+    return Slipping(direction, theta.a_1, theta.a_2, f.stiffness, level, rise, fall)
 
 
 @njit
-def excess_drag(speed: float, free: float, drop: float, fall: float) -> float:
-    """Return by how much the stem is faster than its drag allows; see `settled`."""
-    ratio = speed / fall
-    return speed + drop * math.exp(-ratio * ratio) - free
+def slipped(
+    stem: Stem, before: float, after: float, h: float, slip: Slipping, delta: float
+) -> Stem:
+    """Return the stem after `h` seconds in which p2 goes from `before` to `after`, or its stop."""
+    x, v = stem.x, stem.v
+    middle = 0.5 * (before + after)
+    a1 = acceleration(before, x, v, slip)
+    v2 = v + 0.5 * h * a1
+    a2 = acceleration(middle, x + 0.5 * h * v, v2, slip)
+    v3 = v + 0.5 * h * a2
+    a3 = acceleration(middle, x + 0.5 * h * v2, v3, slip)
+    v4 = v + h * a3
+    a4 = acceleration(after, x + h * v3, v4, slip)
+    end = v + h / 6.0 * (a1 + 2.0 * (a2 + a3) + a4)
+    speed = slip.direction * end
+    if speed <= 0.0 or (stem.armed and speed <= delta):
+        part = v / (v - end) if v != end else 0.0
+        return Stem(x + 0.5 * h * part * v, 0.0, 0.0, False)
+    x += h / 6.0 * (v + 2.0 * (v2 + v3) + v4)
+    return Stem(x, end, slip.direction, stem.armed or speed > delta)
+
+
+@njit(forceinline=True)
+def acceleration(p2: float, x: float, v: float, slip: Slipping) -> float:
+    """Return the acceleration of a slipping stem [%/s^2]."""
+    ratio = v / slip.fall
+    level = slip.level
+    if abs(ratio) < FAST:
+        level += slip.rise * math.exp(-ratio * ratio)
+    return slip.a_1 * (p2 - slip.stiffness * x - slip.direction * level) - slip.a_2 * v
 
 
 EFFECT = Effect(
@@ -127,7 +132,6 @@ EFFECT = Effect(
         ),
     ),
     slots={'motion_slot': motion},
-    longest_step=0.01,
     order=-20,
     explanation='A lubricated packing loses friction only as the stem picks up speed.',
     symptom='Slow motion meets almost static friction; repeated slips whose size varies.',
