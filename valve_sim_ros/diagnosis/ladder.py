@@ -10,12 +10,15 @@ from typing import Literal
 from . import odds
 from .adequacy import Leftover, leftover
 from .base_valve import find_base
-from .fitting import Fitter, Valve
+from .fitting import by_cost, Fitter, Valve
 from .race import race, rebased
 from .stages import Candidate, Group
 
 MOST_EFFECTS = 2
 """Most effects named in one group of stages."""
+
+DEEPENED = 3
+"""So many effects are searched more deeply where none explains what is left."""
 
 RECONSIDERED = 5
 """So many rivals of the first effect are tried again beside the second."""
@@ -133,7 +136,10 @@ def climb(
         for step in range(MOST_EFFECTS):
             if not candidates or not worth(before):
                 break
-            runners = race(fitter, group, now, candidates, _within(progress, step))
+            told = _within(progress, step)
+            runners = race(fitter, group, now, candidates, told)
+            if group.has_stem and not rungs and 'x' not in fitter.drive:
+                runners = deepened(fitter, group, runners, told)
             now = rebased(fitter, group, now, runners[:5])
             before = leftover(fitter.residuals(now, group.signal))
             if not rungs:
@@ -159,6 +165,20 @@ def climb(
         complete = True
     after = leftover(fitter.residuals(now, group.signal))
     return Ladder(group, 'adequate', base, now, base_left, after, tuple(rungs), guess, complete)
+
+
+def deepened(
+    fitter: Fitter, group: Group, runners: list[Valve], progress: Callable[[float], object]
+) -> list[Valve]:
+    """Search for the base valve anew beside the best effects, if none explains the signal."""
+    if leftover(fitter.residuals(runners[0], group.signal)).excess <= odds.CLEAN:
+        return runners
+    found = []
+    for each in odds.best_per_effect(runners)[:DEEPENED]:
+        progress(1.0)
+        there = find_base(fitter, group, each, fitter.drive)
+        found.append(fitter.refined(there, fitter.problem(group, there)))
+    return sorted([*found, *runners], key=by_cost)
 
 
 def reconsidered(fitter: Fitter, group: Group, base: Valve, rungs: Sequence[Rung]) -> list[Rung]:
