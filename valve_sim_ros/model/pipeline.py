@@ -259,7 +259,8 @@ def advance(
     step, now, left = transition, state, 1
     while True:
         motion = pushed(inlet, lag, now, theta, step, effects, memory)
-        if step.step == dt and (motion.stem.direction != 0.0 or motion.stem.x != state.x):
+        moves = motion.stem.direction != 0.0 or motion.stem.x != state.x or state.v != 0.0
+        if moves and step.step == dt:
             longest = stride_slot(dt, state, effects, memory, dt)
             if longest < dt:  # again, in short steps
                 left = math.ceil(dt / longest)
