@@ -39,7 +39,7 @@ unexport NUMBA_DISABLE_JIT
 ISOLATED = logs=$$(mktemp -d) && trap 'rm -rf "$$logs"' EXIT && export ROS_LOG_DIR=$$logs \
 	ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST ROS_DOMAIN_ID=$$(( $$$$ % 101 + 1 )) &&
 
-.PHONY: help demo test lint format bench paper blind blind-tuning starts coverage ragged
+.PHONY: help demo test lint format bench paper blind blind-tuning steps starts coverage ragged
 .PHONY: lower-bounds colcon lock clean check-python
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
@@ -77,6 +77,9 @@ blind: $(VENV)/.ready  ## diagnose hidden effects on blind records (hours); tabl
 
 blind-tuning: $(VENV)/.ready  ## the same on the half that thresholds may be set on, no table
 	@$(BIN)/python -m blind study --split tuning $(BLIND_ARGS)
+
+steps: $(VENV)/.ready  ## is a sample with an effect as good as many short ones?
+	@$(BIN)/python studies/short_steps.py
 
 starts: $(VENV)/.ready  ## does the search find the optimum of 100 random valves?
 	@$(BIN)/python studies/random_valves.py

@@ -138,6 +138,7 @@ def climb(
                 break
             told = _within(progress, step)
             runners = race(fitter, group, now, candidates, told)
+            # in the second look the stem is put to rest already, no valley of the base is missed
             if group.has_stem and not rungs and 'x' not in fitter.drive:
                 runners = deepened(fitter, group, runners, told)
             now = rebased(fitter, group, now, runners[:5])

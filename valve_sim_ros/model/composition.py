@@ -14,7 +14,8 @@ import numpy as np
 
 from .declarations import Effect
 from .effects import CATALOGUE
-from .pipeline import Array, BASE_STEP
+from .pipeline import Array
+from .state import BASE_STEP
 
 
 class Place(NamedTuple):

@@ -13,7 +13,7 @@ Their dt is that of the step, and `state` is that at its start, but for the sens
 """
 
 import math
-from typing import Any, NamedTuple
+from typing import Any
 
 from numba import njit
 import numpy as np
@@ -22,96 +22,10 @@ import numpy.typing as npt
 from .borrowing import borrowed
 from .electro_pneumatic import backlash
 from .pneumatic import chamber_pressure, is_filling
-from .stem import forced_gain, free_motion, Friction, Poles, Stem, stem_poles, stem_step
+from .state import BASE_STEP, Lag, lag_over, Motion, State, Theta, Transition, transition_over
+from .stem import free_motion, Friction, Stem, stem_poles, stem_step
 
 Array = npt.NDArray[np.float64]
-
-
-class State(NamedTuple):
-    """The valve between two samples.
-
-    p1, p2, x [% of span], v [%/s], slip direction, arming, output of the backlash [% of span]
-    (p1, unless an effect stands between them), command in force [% of span], time since the
-    first sample [s].
-    """
-
-    p1: float
-    p2: float
-    x: float
-    v: float
-    direction: float
-    armed: float
-    play: float
-    command: float
-    time: float
-
-
-class Theta(NamedTuple):
-    """The parameters: `parameters.BASE` in order, then 1 for branch = printed."""
-
-    f_d1: float
-    t_g1: float
-    t_g2: float
-    f_s: float
-    f_d: float
-    a_1: float
-    a_2: float
-    delta: float
-    printed: float
-
-
-class Lag(NamedTuple):
-    """The chamber over one step: rate [1/s], decay over it, and what the stem makes of it."""
-
-    rate: float
-    decay: float
-    gain: float
-    stem_rate: float
-
-
-class Motion(NamedTuple):
-    """The stem and the pressure p2 [% of span] after a step, and what drove them.
-
-    The opening force was target + excess exp(-rate tau) [% of span]; theta are the valve's
-    parameters.
-    """
-
-    stem: Stem
-    p2: float
-    target: float
-    excess: float
-    rate: float
-    friction: Friction
-    theta: Theta
-
-
-@njit(forceinline=True)
-def moved(motion: Motion, stem: Stem, p2: float) -> Motion:
-    """Return the motion with another stem and pressure p2 [% of span] after the step."""
-    m = motion
-    return Motion(stem, p2, m.target, m.excess, m.rate, m.friction, m.theta)
-
-
-class Transition(NamedTuple):
-    """What depends on the parameters and the step alone, kept between equal steps.
-
-    A sample of `dt` seconds is taken in `substeps` equal steps of `step` seconds.
-    """
-
-    dt: float
-    substeps: int
-    step: float
-    filling: Lag
-    emptying: Lag
-    poles: Poles
-    phi1: float
-    phi2: float
-
-
-BASE_STEP = math.inf
-"""The base valve is exact over a step of any length."""
-STATE_SIZE = len(State._fields)
-THETA_SIZE = len(Theta._fields)
 
 
 @njit(forceinline=True)
@@ -136,32 +50,6 @@ motion_slot = unchanged
 """Motion after each step: stops, limits of speed, what the moved stem does to the chamber."""
 sensor_slot = unchanged
 """x as measured [% of span]: linkage, lag, calibration, quantisation, drift."""
-
-
-@njit
-def lag_over(rate: float, dt: float, a_1: float, a_2: float, stiffness: float) -> Lag:
-    """Return the chamber's lag over a step of `dt` seconds and the stem's answer to it."""
-    gain, stem_rate = forced_gain(rate, a_1, a_2, stiffness)
-    return Lag(rate, math.exp(-dt * rate), gain, stem_rate)
-
-
-@njit
-def transition_over(dt: float, theta: Theta, finest: float) -> Transition:
-    """Return what a sample of `dt` seconds needs, taken in steps of at most `finest` seconds."""
-    substeps = max(1, math.ceil(dt / finest))
-    step = dt / substeps
-    poles = stem_poles(theta.a_1, theta.a_2)
-    phi1, phi2 = free_motion(step, poles)
-    return Transition(
-        dt,
-        substeps,
-        step,
-        lag_over(1.0 / theta.t_g1, step, theta.a_1, theta.a_2, 1.0),
-        lag_over(1.0 / theta.t_g2, step, theta.a_1, theta.a_2, 1.0),
-        poles,
-        phi1,
-        phi2,
-    )
 
 
 @njit(forceinline=True)
@@ -257,7 +145,7 @@ def advance(
     filling = is_filling(inlet, p1, state.p2, theta.printed != 0.0)
     lag = transition.filling if filling else transition.emptying
     step, now, left = transition, state, 1
-    while True:
+    while left > 0:
         motion = pushed(inlet, lag, now, theta, step, effects, memory)
         moves = motion.stem.direction != 0.0 or motion.stem.x != state.x or state.v != 0.0
         if moves and step.step == dt:
@@ -268,16 +156,13 @@ def advance(
                 lag = step.filling if filling else step.emptying
                 continue
         stem, p2 = motion_slot(motion, now, effects, memory, step.step)[:2]
-        left -= 1
-        if left == 0:
-            break
         armed = 1.0 if stem.armed else 0.0
         time = now.time + step.step
         now = State(now.p1, p2, stem.x, stem.v, stem.direction, armed, now.play, now.command, time)
-    armed = 1.0 if stem.armed else 0.0
+        left -= 1
     time = state.time + dt
-    after = State(p1, p2, stem.x, stem.v, stem.direction, armed, play, u, time)
-    return after, sensor_slot(stem.x, after, effects, memory, dt)
+    after = State(p1, now.p2, now.x, now.v, now.direction, now.armed, play, u, time)
+    return after, sensor_slot(after.x, after, effects, memory, dt)
 
 
 @njit(forceinline=True)
@@ -299,14 +184,14 @@ def advance_sample(
 
 @njit(forceinline=True)
 def state_from(values: Array) -> State:
-    """Return an array of STATE_SIZE numbers as a state."""
+    """Return an array of nine numbers as a state."""
     v = values
     return State(v[0], v[1], v[2], v[3], v[4], v[5], v[6], v[7], v[8])
 
 
 @njit(forceinline=True)
 def theta_from(values: Array) -> Theta:
-    """Return an array of THETA_SIZE numbers as parameters."""
+    """Return an array of nine numbers as parameters."""
     v = values
     return Theta(v[0], v[1], v[2], v[3], v[4], v[5], v[6], v[7], v[8])
 
@@ -344,9 +229,9 @@ def run(
         Commands [% of span].
     dt : ndarray, shape (n,) or (1,)
         Time since the sample before [s]. Of length 1: that step after a first one of 0 s.
-    state : ndarray, shape (STATE_SIZE,)
+    state : ndarray, shape (9,), a `State`
         Updated in place.
-    theta : ndarray, shape (THETA_SIZE,)
+    theta : ndarray, shape (9,), a `Theta`
         Parameters.
     finest : float
         Longest step inside a sample [s]; infinite where the closed forms are exact.

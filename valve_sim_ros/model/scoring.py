@@ -7,7 +7,8 @@ from typing import Any
 from numba import njit
 
 from .borrowing import borrowed
-from .pipeline import advance_sample, Array, State, state_from, theta_from, transition_over
+from .pipeline import advance_sample, Array, state_from, theta_from
+from .state import State, transition_over
 
 HUBER = 4.0
 """Error beyond which a score grows linearly [noise]."""

@@ -11,13 +11,13 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from . import pipeline
 from .errors import ModelError
 from .kernels import Make, make
 from .parameters import SAMPLE_TIME
 from .pipeline import Array
 from .rivals import RIVALS
 from .spec import BASE_MODEL, ValveSpec
+from .state import BASE_STEP, State
 
 NO_EFFECTS: tuple[()] = ()
 
@@ -40,9 +40,7 @@ class InitialState:
         if spec.model != BASE_MODEL:
             return np.asarray(RIVALS[spec.model].start(self.p1, self.p2, self.x, spec.theta))
         return np.array(
-            pipeline.State(
-                self.p1, self.p2, self.x, 0.0, 0.0, 0.0, play=self.p1, command=self.p1, time=0.0
-            )
+            State(self.p1, self.p2, self.x, 0.0, 0.0, 0.0, play=self.p1, command=self.p1, time=0.0)
         )
 
 
@@ -65,7 +63,7 @@ def machine(spec: ValveSpec) -> Make:
 def drive(spec: ValveSpec) -> Drive:
     """Return what the functions of `machine(spec)` need, with the effects' memory empty."""
     if not spec.active:
-        return Drive(spec.theta, pipeline.BASE_STEP, NO_EFFECTS, NO_EFFECTS)
+        return Drive(spec.theta, BASE_STEP, NO_EFFECTS, NO_EFFECTS)
     effects, memory_size, finest = spec.composition
     return Drive(spec.theta, finest, effects, np.zeros(memory_size))
 

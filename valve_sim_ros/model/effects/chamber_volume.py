@@ -7,7 +7,7 @@ from typing import Any
 from numba import njit
 
 from ..declarations import Effect, EffectParameter
-from ..pipeline import Motion, moved
+from ..state import Motion, moved
 
 ABSOLUTE = 150.0
 """Absolute pressure at p2 = 0 [% of span]: 1.2 bar where the span is 0.2 to 1.0 bar."""

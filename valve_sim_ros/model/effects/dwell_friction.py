@@ -8,7 +8,7 @@ from typing import Any
 from numba import njit
 
 from ..declarations import Effect, EffectParameter
-from ..pipeline import Motion
+from ..state import Motion
 from ..stem import Friction
 
 

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 from numba import njit
 
 from ..declarations import Effect, EffectParameter
-from ..pipeline import Motion, moved
+from ..state import Motion, moved
 from ..stem import Friction, Stem
 
 DROP = 1.0

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 from numba import njit
 
 from ..declarations import Effect, EffectParameter
-from ..pipeline import Motion, moved, Theta
+from ..state import Motion, moved, Theta
 from ..stem import Friction, Stem
 
 STEP, STABLE = 0.002, 0.4

@@ -7,7 +7,7 @@ from typing import Any
 from numba import njit
 
 from ..declarations import Effect, EffectParameter
-from ..pipeline import Motion, moved
+from ..state import Motion, moved
 from ..stem import Stem
 
 FAR = 60.0
