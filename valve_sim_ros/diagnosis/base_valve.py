@@ -29,8 +29,13 @@ def starting_valve(bench: Bench) -> Valve:
     return Valve(values)
 
 
-def find_base(fitter: Fitter, group: Group, valve: Valve, drive: Sequence[str]) -> Valve:
-    """Find the base valve's values in one group from a grid, `drive` as measured."""
+def find_base(
+    fitter: Fitter, group: Group, valve: Valve, drive: Sequence[str], *, roughly: bool = False
+) -> Valve:
+    """Find the base valve's values in one group from a grid, `drive` as measured.
+
+    `roughly` leaves out the long searches, where the values are sought anew later.
+    """
     if group.stages == ('u-p1',) and drive == group.drive:
         _settle_phase(fitter, group, valve)
         phase = min(max(0.0, fitter.phase.lower), fitter.phase.upper)
@@ -46,6 +51,8 @@ def find_base(fitter: Fitter, group: Group, valve: Valve, drive: Sequence[str]) 
         starts += [{**valve.values, **there} for there in friction_grid(seen)]
     count = STEM_STARTS if alone else FEW_STARTS
     found = fitter.best_of(valve, starts, problem, count)
+    if roughly:
+        return found[0]
     if not group.has_stem:
         return fitter.refined(found[0], problem)
     # put to rest where it was seen to rest, a stem that slips too late is only a little wrong

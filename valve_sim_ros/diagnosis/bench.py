@@ -126,7 +126,7 @@ class Bench:
         theta = np.array([*(values[name] for name in THETA), DELTA.default, 0.0])
         grid = self.stretches[index].grid(values.get('phase', 0.0), tuple(drive))
         outputs = np.empty((len(OUTPUTS) + 1, grid.u.size))
-        score = scored()(
+        score = scored(bool(effects))(
             grid.u,
             grid.dt,
             self.start(index, values),

@@ -84,7 +84,8 @@ def diagnose(
         valve = _known(starting_valve(bench), spec)
         for group in parts:
             tell(0.05, f'fitting the base valve to {group.signal}')
-            valve = find_base(fitter, group, valve, group.drive)
+            later = group is not parts[0]
+            valve = find_base(fitter, group, valve, group.drive, roughly=later)
     except stops:
         raise DiagnosisError(
             'stopped before the base valve was fitted; let it run a little longer'

@@ -5,13 +5,15 @@
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
-from itertools import repeat
+from functools import partial
+import math
 import os
 
 import numpy as np
 from scipy.signal import periodogram
 
 from ..model.pipeline import Array
+from .adequacy import leftover
 from .fitting import by_cost, eased, Fitter, Problem, SHORT, Valve
 from .stages import Candidate, Group
 from .starts import friction_grid
@@ -23,6 +25,9 @@ MOST_STARTS, FEWER_STARTS = 24, 8
 so many of the best."""
 SCREENED, FINISHERS, REFINED = 3, 5, 2
 """How many starts of a candidate are followed, runners refitted, and refined to the end."""
+SPOTLESS, BEHIND = 0.1, 0.5
+"""Where the best leaves no more than this excess, runners short of more than this part of its gain
+are not followed."""
 
 Frictions = Sequence[dict[str, float]]
 
@@ -41,12 +46,12 @@ def race(
         results = fitter.results(valve)
         peaks = _peaks(fitter, np.nan_to_num(fitter.bench.residual(results, group.signal)))
         frictions = friction_grid(fitter.bench.friction_seen(results))
-    done, total = 0, len(candidates) + FINISHERS
+    done = 0
 
     def count(runner: Valve) -> Valve:
         nonlocal done
         done += 1
-        progress(min(done / total, 1.0))
+        progress(done / len(candidates))
         return runner
 
     def screened(candidate: Candidate) -> Valve:
@@ -62,15 +67,25 @@ def race(
     def refined(runner: Valve) -> Valve:
         return fitter.refined(runner, fitter.problem(group, runner))
 
+    def within(runners: Sequence[Valve], most: int) -> int:
+        """Return how many are to be followed: none far behind one that leaves little."""
+        best = runners[0].cost
+        left = leftover(fitter.residuals(runners[0], group.signal))
+        limit = best + BEHIND * (valve.cost - best) if left.excess <= SPOTLESS else math.inf
+        return sum(runner.cost <= limit for runner in runners[:most])
+
     with ThreadPoolExecutor(os.cpu_count()) as pool:  # compiled runs release the lock
+
+        def followed(how: Callable[..., Valve], runners: list[Valve], most: int) -> list[Valve]:
+            """Return the runners, the best of them taken further, in their new order."""
+            most = within(runners, most)
+            return sorted([*pool.map(how, runners[:most]), *runners[most:]], key=by_cost)
+
         runners = sorted(map(count, pool.map(screened, candidates)), key=by_cost)
         for left, generations in ROUNDS if group.has_stem else ():
-            first = pool.map(evolved, runners[:left], repeat(generations))
-            runners = sorted([*first, *runners[left:]], key=by_cost)
-        first = pool.map(fitted, runners[:FINISHERS])
-        runners = sorted([*map(count, first), *runners[FINISHERS:]], key=by_cost)
-        last = REFINED if group.has_stem else 0
-        return sorted([*pool.map(refined, runners[:last]), *runners[last:]], key=by_cost)
+            runners = followed(partial(evolved, generations=generations), runners, left)
+        runners = followed(fitted, runners, FINISHERS)
+        return followed(refined, runners, REFINED) if group.has_stem else runners
 
 
 def rebased(fitter: Fitter, group: Group, valve: Valve, runners: Sequence[Valve]) -> Valve:

@@ -27,11 +27,18 @@ class Place(NamedTuple):
 
 STRIDE = 0
 """Where the longest step of a moving stem is kept, before all flags."""
+FILLED = {
+    slot: place
+    for place, slot in enumerate(
+        sorted({s for e in CATALOGUE.values() for s in e.slots}), STRIDE + 1
+    )
+}
+"""Where it is told, slot by slot, whether any effect is at work there: asked in every step."""
 
 
 def _places() -> tuple[dict[str, Place], int, int]:
     """Lay all effects out one after the other."""
-    places, flag, memory = {}, STRIDE + 1, 0
+    places, flag, memory = {}, STRIDE + 1 + len(FILLED), 0
     for effect in CATALOGUE.values():
         places[effect.id] = Place(flag, memory)
         flag += 1 + len(effect.parameters)
@@ -58,6 +65,8 @@ def compose(active: Iterable[str], values: Mapping[str, float]) -> Composition:
         effects[flag] = 1.0
         for offset, parameter in enumerate(effect.parameters, 1):
             effects[flag + offset] = values[f'{name}.{parameter.name}']
+        for slot in effect.slots:
+            effects[FILLED[slot]] = 1.0
         finest = min(finest, effect.longest_step)
         stride = min(stride, effect.stride)
     effects[STRIDE] = stride
@@ -73,6 +82,9 @@ def slot_function(slot: str) -> Any:
     lines = [f'def {slot}(value, state, effects, memory, dt):']
     if slot == 'stride_slot':
         lines.append(f'    value = min(value, effects[{STRIDE}])')
+    if filling:
+        lines.append(f'    if effects[{FILLED[slot]}] == 0.0:')
+        lines.append('        return value')
     space: dict[str, Any] = {}
     for effect in filling:
         space[effect.id] = effect.slots[slot]

@@ -83,14 +83,18 @@ def interpreted(function: Any, slots: Mapping[str, Any]) -> Any:
     return remake(function, lambda python, **_: python, slots)
 
 
+def filled(effects: bool) -> tuple[dict[str, Any], str]:
+    """Return the slots with the whole catalogue of effects, or with none, and their label."""
+    return ({name: slot_function(name) for name in SLOTS}, 'effects') if effects else ({}, 'base')
+
+
 @cache
 def make(effects: bool = False) -> Make:
     """Return the makes of the base valve, or of that with the whole catalogue of effects.
 
     Nothing is compiled before the first call of `run` or `step`.
     """
-    slots = {name: slot_function(name) for name in SLOTS} if effects else {}
-    label = 'effects' if effects else 'base'
+    slots, label = filled(effects)
     return Make(
         kept(pipeline.run, slots, label),
         kept(pipeline.step, slots, label),
@@ -99,7 +103,6 @@ def make(effects: bool = False) -> Make:
 
 
 @cache
-def scored() -> Any:
-    """Return `scoring.run_scored` with the whole catalogue of effects."""
-    slots = {name: slot_function(name) for name in SLOTS}
-    return kept(run_scored, slots, 'effects')
+def scored(effects: bool) -> Any:
+    """Return `scoring.run_scored` of the base valve, or with the whole catalogue of effects."""
+    return kept(run_scored, *filled(effects))
