@@ -214,6 +214,7 @@ def _climb_all(
             valve,
             candidates,
             refit=bool(ladders),
+            carried=_carried(ladders),
             progress=_within(tell, share, width, text),
             stops=stops,
         )
@@ -236,6 +237,12 @@ def _climb_all(
             fitter.drive = (*fitter.drive, group.signal)
     fitter.drive = ()
     return ladders, base
+
+
+def _carried(ladders: Sequence[Ladder]) -> float:
+    """Return the most that the signals before leave, if that is more than next to nothing."""
+    left = [ladder.after.excess for ladder in ladders]
+    return max((excess for excess in left if excess > odds.CLEAN), default=0.0)
 
 
 def _second_look(

@@ -93,6 +93,7 @@ def climb(
     candidates: Sequence[Candidate],
     *,
     refit: bool,
+    carried: float = 0.0,
     progress: Callable[[float], object],
     stops: tuple[type[BaseException], ...],
 ) -> Ladder:
@@ -110,6 +111,8 @@ def climb(
         What may be missing.
     refit : bool
         Find the base valve's values in these stages anew.
+    carried : float
+        Excess that the signals before this one leave: no more than that says nothing.
     progress : callable
         Called with the share done.
     stops : tuple of type
@@ -124,6 +127,8 @@ def climb(
         return replace(there, cost=cost), leftover(fitter.residuals(there, group.signal))
 
     def worth(left: Leftover) -> bool:
+        if left.excess <= carried:
+            return False
         if rungs:
             return left.excess > odds.CLEAN
         return odds.suspicious(left, group.signal, fitter.bench.mixed)

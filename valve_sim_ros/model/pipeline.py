@@ -27,6 +27,9 @@ from .stem import free_motion, Friction, Stem, stem_poles, stem_step
 
 Array = npt.NDArray[np.float64]
 
+STEADY, GLIDE = 0.1, 8.0
+"""A stem whose speed changes by less than this part glides: its steps may be so much longer."""
+
 
 @njit(forceinline=True)
 def unchanged(value: Any, state: Any, effects: Any, memory: Any, dt: float) -> Any:
@@ -150,6 +153,8 @@ def advance(
         moves = motion.stem.direction != 0.0 or motion.stem.x != state.x or state.v != 0.0
         if moves and step.step == dt:
             longest = stride_slot(dt, state, effects, memory, dt)
+            if abs(motion.stem.v - state.v) < STEADY * abs(state.v):
+                longest *= GLIDE
             if longest < dt:  # again, in short steps
                 left = math.ceil(dt / longest)
                 step = transition_over(dt / left, theta, BASE_STEP)

@@ -22,12 +22,15 @@ def flow(value: Any, state: Any, p: Any, memory: Any, dt: float) -> tuple[float,
 
 @njit
 def motion(value: Any, state: Any, p: Any, memory: Any, dt: float) -> Motion:
-    """Let the displaced volume change p2, isothermally; half a step ahead, as p2 acts late."""
+    """Let the displaced volume change p2, isothermally; half a step ahead, as p2 acts late.
+
+    The place before is kept: where a search puts the stem elsewhere, the air gives way too.
+    """
     ratio, displacement = p
-    lead = 0.5 * dt * value.stem.v
-    before = max(1.0 + ratio * (state.x + memory[0]) / 100.0, 0.05)
-    after = max(1.0 + ratio * (value.stem.x + lead) / 100.0, 0.05)
-    memory[0] = lead
+    place = value.stem.x + 0.5 * dt * value.stem.v
+    before = max(1.0 + ratio * (memory[0] if memory[1] > 0.0 else state.x) / 100.0, 0.05)
+    after = max(1.0 + ratio * place / 100.0, 0.05)
+    memory[0], memory[1] = place, 1.0
     change = (value.p2 + ABSOLUTE) * (before / after - 1.0)
     return moved(value, value.stem, value.p2 + displacement * change)
 
@@ -62,8 +65,8 @@ EFFECT = Effect(
         ),
     ),
     slots={'flow_slot': flow, 'motion_slot': motion},
-    memory=1,
-    stride=0.005,
+    memory=2,
+    stride=0.01,
     order=10,
     variants=(('ratio',), ('ratio', 'displacement')),
     explanation='The opening stem enlarges the chamber, so the same flow raises p2 more slowly.',
