@@ -13,8 +13,8 @@ from .stages import Group
 from .starts import friction_grid, grid, START, STEMS
 from .unknowns import EARLY, LATE, PHASE
 
-FEW_STARTS, STEM_STARTS = 3, 6
-"""So many starts are followed, and where only the stem is sought."""
+FEW_STARTS = 3
+"""So many starts are followed."""
 FOLLOWED, GENERATIONS = 4, 30
 """So many base valves are followed by an evolution where costs are rugged, and for how long."""
 
@@ -49,15 +49,24 @@ def find_base(
     if alone:
         seen = fitter.bench.friction_seen(fitter.results(valve))
         starts += [{**valve.values, **there} for there in friction_grid(seen)]
-    count = STEM_STARTS if alone else FEW_STARTS
-    found = fitter.best_of(valve, starts, problem, count)
+    apart = [starts]
+    if alone:  # of each share of friction one, or all end in the same valley
+        shares = dict.fromkeys(start['f_d/f_s'] for start in starts)
+        apart = [[start for start in starts if start['f_d/f_s'] == share] for share in shares]
+
+    def followed(way: Problem) -> list[Valve]:
+        most = 1 if alone else FEW_STARTS
+        tried = [each for some in apart for each in fitter.scan(valve, some, way, most)]
+        return sorted((fitter.fit(each, way, SHORT) for each in tried), key=by_cost)
+
+    found = followed(problem)
     if roughly:
         return found[0]
     if not group.has_stem:
         return fitter.refined(found[0], problem)
     # put to rest where it was seen to rest, a stem that slips too late is only a little wrong
     way = eased(problem)
-    eases = found if way == problem else fitter.best_of(valve, starts, way, count)
+    eases = found if way == problem else followed(way)
 
     def by_way_of_rests(each: Valve) -> Valve:
         return fitter.fit(fitter.evolve(each, way, GENERATIONS, NARROW), problem, SHORT)
@@ -79,7 +88,7 @@ def _settle_phase(fitter: Fitter, group: Group, valve: Valve) -> None:
         problem: Problem = (fitter.unknowns(group), group.signal, group.drive)
         values = {**valve.values, 'phase': min(phase.upper, 0.0)}
         starts = [{**values, **there} for there in grid(problem[0])]
-        best.append(fitter.best_of(valve, starts, problem, 1)[0])
+        best.append(fitter.fit(fitter.scan(valve, starts, problem)[0], problem, SHORT))
     fitter.phase = EARLY if best[0].cost <= best[1].cost else LATE
     on_time = replace(best[0], values={**best[0].values, 'phase': 0.0})
     results = fitter.results(on_time, ())

@@ -3,6 +3,7 @@
 """A recording on the test bench: any valve run beside it, and what is left of each signal."""
 
 from collections.abc import Mapping, Sequence
+from functools import cached_property
 import math
 
 import numpy as np
@@ -27,6 +28,8 @@ LEAST_AT_REST = 0.3
 """Share of the samples of p1 that counts even so."""
 TRAVEL, MOST_UNSETTLED = 8.0, 0.1
 """A record counts once the valve has travelled this far [%], or after this share."""
+LEVELS, NEAR_LEVEL, MOST_ON_LEVEL = 0.1, 0.05, 0.95
+"""x has so few values where its sensor is coarse, and nearly all are close to whole steps."""
 SLACK = 0.03
 """By so much p2 may be off where the stem begins to slip [% of span]."""
 LEAST_RESTS = 20
@@ -222,6 +225,23 @@ class Bench:
             stretch.noise = {n: self._uncertainty(n, v) for n, v in stretch.measured.items()}
             p1 = np.where(self._steps(result) > limit, np.nan, stretch.counts['p1'])
             stretch.recount({**stretch.counts, 'p1': p1})
+
+    @cached_property
+    def steps_of_x(self) -> tuple[float, ...]:
+        """The step of which all x are multiples, if there is one [% of span]."""
+        if 'x' not in self.signals:
+            return ()
+        x = np.concatenate([s.measured['x'] for s in self.stretches])
+        x = x[np.isfinite(x)]
+        levels = np.unique(x)
+        if not 1 < levels.size < LEVELS * x.size:
+            return ()
+        step = float(np.median(np.diff(levels)))
+        for _ in range(2):
+            count = np.round(x / step)
+            step = float(x @ count / (count @ count))
+        on_level = np.abs(x / step - np.round(x / step)) < NEAR_LEVEL
+        return (step,) if on_level.mean() > MOST_ON_LEVEL else ()
 
     @property
     def mixed(self) -> bool:

@@ -22,6 +22,8 @@ SHORT = 4
 SPREAD, NARROW = 5.0, 3.0
 """Standard deviation with which an evolution begins, and near an optimum [steps of unknowns]."""
 POPULATION = 14
+MOST_TURNS = 3
+"""Most evolutions by which a valve is refined."""
 
 
 @dataclass(frozen=True)
@@ -140,29 +142,19 @@ class Fitter:
     def refined(self, valve: Valve, problem: Problem) -> Valve:
         """Return a valve after descents and, where costs are rugged, evolutions in turn."""
         valve = self.fit(valve, problem)
-        while 'f_s' in (unknown.name for unknown in problem[0]):
+        rugged = 'f_s' in (unknown.name for unknown in problem[0])
+        for _ in range(MOST_TURNS if rugged else 0):
             more = self.evolve(valve, problem, 40, NARROW)
             more = self.fit(more, problem)
-            if more.cost > 0.99 * valve.cost:
-                return min(valve, more, key=by_cost)
-            valve = more
+            ends = more.cost > 0.99 * valve.cost
+            valve = min(valve, more, key=by_cost)
+            if ends:
+                break
         return valve
 
     def problem(self, group: Group, valve: Valve) -> Problem:
         """Return what a refit of a valve varies in a group, driven as is usual here."""
         return (*self.unknowns(group), *valve.freed), group.signal, self.drive
-
-    def best_of(
-        self,
-        valve: Valve,
-        starts: Sequence[Mapping[str, float]],
-        problem: Problem,
-        count: int,
-    ) -> list[Valve]:
-        """Try starts, descend a little from the best of them, and order what comes out."""
-        tried = self.scan(valve, starts, problem, count)
-        fits = [self.fit(there, problem, SHORT) for there in tried]
-        return sorted(fits, key=by_cost)
 
     def scan(
         self,

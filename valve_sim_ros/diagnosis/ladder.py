@@ -11,7 +11,7 @@ from . import odds
 from .adequacy import Leftover, leftover
 from .base_valve import find_base
 from .fitting import by_cost, Fitter, Valve
-from .race import race, rebased
+from .race import in_reach, race, rebased
 from .stages import Candidate, Group
 
 MOST_EFFECTS = 2
@@ -145,7 +145,7 @@ def climb(
             runners = race(fitter, group, now, candidates, told)
             # in the second look the stem is put to rest already, no valley of the base is missed
             if group.has_stem and not rungs and 'x' not in fitter.drive:
-                runners = deepened(fitter, group, runners, told)
+                runners = deepened(fitter, group, now, runners, told)
             now = rebased(fitter, group, now, runners[:5])
             before = leftover(fitter.residuals(now, group.signal))
             if not rungs:
@@ -174,13 +174,17 @@ def climb(
 
 
 def deepened(
-    fitter: Fitter, group: Group, runners: list[Valve], progress: Callable[[float], object]
+    fitter: Fitter,
+    group: Group,
+    valve: Valve,
+    runners: list[Valve],
+    progress: Callable[[float], object],
 ) -> list[Valve]:
     """Search for the base valve anew beside the best effects, if none explains the signal."""
     if leftover(fitter.residuals(runners[0], group.signal)).excess <= odds.CLEAN:
         return runners
     found = []
-    for each in odds.best_per_effect(runners)[:DEEPENED]:
+    for each in in_reach(valve, odds.best_per_effect(runners)[:DEEPENED]):
         progress(1.0)
         there = find_base(fitter, group, each, fitter.drive)
         found.append(fitter.refined(there, fitter.problem(group, there)))

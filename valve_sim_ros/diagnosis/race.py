@@ -6,7 +6,6 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from functools import partial
-import math
 import os
 
 import numpy as np
@@ -25,9 +24,9 @@ MOST_STARTS, FEWER_STARTS = 24, 8
 so many of the best."""
 SCREENED, FINISHERS, REFINED = 3, 5, 2
 """How many starts of a candidate are followed, runners refitted, and refined to the end."""
-SPOTLESS, BEHIND = 0.1, 0.5
-"""Where the best leaves no more than this excess, runners short of more than this part of its gain
-are not followed."""
+SPOTLESS, FAR_AHEAD, BEHIND = 0.1, 0.2, 0.5
+"""Where the best leaves no more than this excess, or this part of the cost, runners short of more
+than a part of its gain are not followed."""
 
 Frictions = Sequence[dict[str, float]]
 
@@ -40,11 +39,15 @@ def race(
     progress: Callable[[float], object] = lambda share: None,
 ) -> list[Valve]:
     """Return valves with one more effect, best first; the better, the more refitted."""
-    peaks: tuple[float, ...] = ()
+    seen: dict[str, tuple[float, ...]] = {}
     frictions: Frictions = ()
     if group.has_stem:
         results = fitter.results(valve)
-        peaks = _peaks(fitter, np.nan_to_num(fitter.bench.residual(results, group.signal)))
+        residual = np.nan_to_num(fitter.bench.residual(results, group.signal))
+        seen = {
+            'vibration.frequency': _peaks(fitter, residual),
+            'sensor_quantisation.step': fitter.bench.steps_of_x,
+        }
         frictions = friction_grid(fitter.bench.friction_seen(results))
     done = 0
 
@@ -55,7 +58,7 @@ def race(
         return runner
 
     def screened(candidate: Candidate) -> Valve:
-        return _screened(fitter, candidate, group, valve, candidate.starts(peaks), frictions)
+        return _screened(fitter, candidate, group, valve, candidate.starts(seen), frictions)
 
     def evolved(runner: Valve, generations: int) -> Valve:
         more = fitter.evolve(runner, fitter.problem(group, runner), generations)
@@ -68,11 +71,11 @@ def race(
         return fitter.refined(runner, fitter.problem(group, runner))
 
     def within(runners: Sequence[Valve], most: int) -> int:
-        """Return how many are to be followed: none far behind one that leaves little."""
-        best = runners[0].cost
-        left = leftover(fitter.residuals(runners[0], group.signal))
-        limit = best + BEHIND * (valve.cost - best) if left.excess <= SPOTLESS else math.inf
-        return sum(runner.cost <= limit for runner in runners[:most])
+        """Return how many are to be followed: none far behind one that explains nearly all."""
+        best = runners[0]
+        left = leftover(fitter.residuals(best, group.signal))
+        far_ahead = best.cost < FAR_AHEAD * valve.cost or left.excess <= SPOTLESS
+        return len(in_reach(valve, runners[:most])) if far_ahead else most
 
     with ThreadPoolExecutor(os.cpu_count()) as pool:  # compiled runs release the lock
 
@@ -86,6 +89,12 @@ def race(
             runners = followed(partial(evolved, generations=generations), runners, left)
         runners = followed(fitted, runners, FINISHERS)
         return followed(refined, runners, REFINED) if group.has_stem else runners
+
+
+def in_reach(valve: Valve, runners: Sequence[Valve]) -> list[Valve]:
+    """Return the runners that are not far behind the first in what they gain over the valve."""
+    best = runners[0].cost
+    return [each for each in runners if each.cost <= best + BEHIND * (valve.cost - best)]
 
 
 def rebased(fitter: Fitter, group: Group, valve: Valve, runners: Sequence[Valve]) -> Valve:

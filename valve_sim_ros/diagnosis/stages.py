@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Groups of stages between measured signals, and the effects that may act in each."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
 import math
@@ -37,14 +37,16 @@ class Candidate:
         """Number of places in which a search looks for it."""
         return math.prod(len(starts_of(declared(self.effect, name))) for name in self.names)
 
-    def starts(self, peaks: tuple[float, ...] = ()) -> list[dict[str, float]]:
+    def starts(self, seen: Mapping[str, tuple[float, ...]]) -> list[dict[str, float]]:
         """Return the values from which a search starts, the others neutral.
 
-        Frequencies start at the `peaks` [Hz] of what the base valve leaves over.
+        Parameters that the data show directly start as `seen` there.
         """
-        parameters = [declared(self.effect, name) for name in self.names]
-        each = [peaks if peaks and p.unit == 'Hz' else starts_of(p) for p in parameters]
         names = [f'{self.effect}.{name}' for name in self.names]
+        each = [
+            seen.get(full) or starts_of(declared(self.effect, name))
+            for full, name in zip(names, self.names, strict=True)
+        ]
         return [
             {**self.neutral, **dict(zip(names, values, strict=True))} for values in product(*each)
         ]
