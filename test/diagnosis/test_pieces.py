@@ -105,6 +105,29 @@ def test_where_pressure_creeps_the_moment_of_a_slip_is_forgiven():
     assert np.nanmax(np.abs(much)) > 10.0
 
 
+def test_a_coarse_sensor_shows_its_step():
+    record = recording(noise=0.2)
+
+    def seen(x):
+        return Bench([Recording(record.time, record.u, x=x)]).steps_of_x
+
+    np.testing.assert_allclose(seen(1.37 * np.round(record.x / 1.37)), [1.37], rtol=1e-6)
+    assert seen(record.x) == ()
+    assert seen(np.round(record.x, 2)) == ()  # as written down, far below the noise
+
+
+def test_a_stem_put_to_rest_displaces_the_air_it_would_have_moved():
+    effects = {'chamber_volume.ratio': 1.5, 'chamber_volume.displacement': 1.0}
+    record = recording(**effects)
+    bench = Bench([record])
+    start = {'p1_0': 0.0, 'p2_0': 0.0, 'x_0': 0.0}
+    stuck = complete({**VALUES, **start, **effects, 'f_s': 60.0})  # moves only where it is put
+    (result,) = bench.run(stuck, ('chamber_volume',), ('x',))
+    (free,) = bench.run({**stuck, 'chamber_volume.displacement': 0.0}, ('chamber_volume',), ('x',))
+    dips = np.abs(result[1] - free[1])
+    assert dips.max() > 5.0
+
+
 def test_data_show_where_a_signal_begins_and_what_holds_the_stem():
     record = recording(noise=0.3)
     bench = Bench([record])
