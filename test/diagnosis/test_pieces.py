@@ -111,7 +111,10 @@ def test_a_coarse_sensor_shows_its_step():
     def seen(x):
         return Bench([Recording(record.time, record.u, x=x)]).steps_of_x
 
-    np.testing.assert_allclose(seen(1.37 * np.round(record.x / 1.37)), [1.37], rtol=1e-6)
+    coarse = 1.37 * np.round(record.x / 1.37)
+    assert seen(coarse)[0] == pytest.approx(1.37, rel=1e-3)
+    late = coarse + 0.1 * np.random.default_rng(2).standard_normal(coarse.size)
+    assert seen(late)[0] == pytest.approx(1.37, rel=1e-3)
     assert seen(record.x) == ()
     assert seen(np.round(record.x, 2)) == ()  # as written down, far below the noise
 

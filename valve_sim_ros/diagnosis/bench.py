@@ -7,6 +7,7 @@ from functools import cached_property
 import math
 
 import numpy as np
+from scipy.signal import find_peaks
 
 from ..identification.stretches import noise_of
 from ..model.composition import compose
@@ -28,8 +29,10 @@ LEAST_AT_REST = 0.3
 """Share of the samples of p1 that counts even so."""
 TRAVEL, MOST_UNSETTLED = 8.0, 0.1
 """A record counts once the valve has travelled this far [%], or after this share."""
-LEVELS, NEAR_LEVEL, MOST_ON_LEVEL = 0.1, 0.05, 0.95
-"""x has so few values where its sensor is coarse, and nearly all are close to whole steps."""
+FINEST, COARSEST, ON_STEPS, MOST_STEPS = 0.1, 10.0, 0.6, 3
+"""Steps of a coarse sensor [%], how well x keeps to them (1: exactly), and how many are told."""
+BIN, LONG = 0.01, 32
+"""Bins in which x is counted [%], and how much longer their spectrum is than the span."""
 SLACK = 0.03
 """By so much p2 may be off where the stem begins to slip [% of span]."""
 LEAST_RESTS = 20
@@ -228,20 +231,22 @@ class Bench:
 
     @cached_property
     def steps_of_x(self) -> tuple[float, ...]:
-        """The step of which all x are multiples, if there is one [% of span]."""
+        """Steps to whose multiples x keeps, the likeliest first [% of span]; mostly none."""
         if 'x' not in self.signals:
             return ()
         x = np.concatenate([s.measured['x'] for s in self.stretches])
-        x = x[np.isfinite(x)]
-        levels = np.unique(x)
-        if not 1 < levels.size < LEVELS * x.size:
-            return ()
-        step = float(np.median(np.diff(levels)))
-        for _ in range(2):
-            count = np.round(x / step)
-            step = float(x @ count / (count @ count))
-        on_level = np.abs(x / step - np.round(x / step)) < NEAR_LEVEL
-        return (step,) if on_level.mean() > MOST_ON_LEVEL else ()
+        x = x[(x >= 0.0) & (x < 100.0)]
+        counts = np.histogram(x, round(100.0 / BIN), (0.0, 100.0))[0]
+        # 1 where all x are multiples of one over the frequency, near 0 where they are anywhere
+        length = LONG * counts.size
+        frequency = np.fft.rfftfreq(length, BIN)
+        middle = np.exp(-1j * np.pi * frequency * BIN)  # of the first bin
+        kept = (np.fft.rfft(counts, length) * middle).real / max(x.size, 1)
+        inside = (frequency > 1.0 / COARSEST) & (frequency < 1.0 / FINEST)
+        peaks = find_peaks(np.where(inside, kept, 0.0), height=ON_STEPS)[0]
+        alike = np.minimum(kept[peaks], 0.95 * kept[peaks].max(initial=0.0))  # halves of a step
+        likeliest = peaks[np.argsort(-alike, kind='stable')[:MOST_STEPS]]
+        return tuple((1.0 / frequency[likeliest]).tolist())
 
     @property
     def mixed(self) -> bool:
