@@ -44,10 +44,7 @@ def race(
     if group.has_stem:
         results = fitter.results(valve)
         residual = np.nan_to_num(fitter.bench.residual(results, group.signal))
-        seen = {
-            'vibration.frequency': _peaks(fitter, residual),
-            'sensor_quantisation.step': fitter.bench.steps_of_x,
-        }
+        seen = {'swings': _swings(fitter, residual), 'steps': fitter.bench.steps_of_x}
         frictions = friction_grid(fitter.bench.friction_seen(results))
     done = 0
 
@@ -81,6 +78,7 @@ def race(
 
         def followed(how: Callable[..., Valve], runners: list[Valve], most: int) -> list[Valve]:
             """Return the runners, the best of them taken further, in their new order."""
+            progress(1.0)
             most = within(runners, most)
             return sorted([*pool.map(how, runners[:most]), *runners[most:]], key=by_cost)
 
@@ -143,7 +141,7 @@ def _screened(
     return min((fitter.fit(each, problem, SHORT) for each in found), key=by_cost)
 
 
-def _peaks(fitter: Fitter, residual: Array) -> tuple[float, ...]:
+def _swings(fitter: Fitter, residual: Array) -> tuple[float, ...]:
     """Return the frequencies at which a residual swings most, and their neighbours [Hz]."""
     period = float(np.median(np.diff(fitter.bench.stretches[0].time)))
     frequency, power = periodogram(np.clip(residual, -10.0, 10.0), 1.0 / period)

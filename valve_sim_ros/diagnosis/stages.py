@@ -42,11 +42,9 @@ class Candidate:
 
         Parameters that the data show directly start as `seen` there.
         """
+        parameters = [declared(self.effect, name) for name in self.names]
+        each = [seen.get(p.shown) or starts_of(p) for p in parameters]
         names = [f'{self.effect}.{name}' for name in self.names]
-        each = [
-            seen.get(full) or starts_of(declared(self.effect, name))
-            for full, name in zip(names, self.names, strict=True)
-        ]
         return [
             {**self.neutral, **dict(zip(names, values, strict=True))} for values in product(*each)
         ]

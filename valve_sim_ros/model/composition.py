@@ -27,12 +27,8 @@ class Place(NamedTuple):
 
 STRIDE = 0
 """Where the longest step of a moving stem is kept, before all flags."""
-FILLED = {
-    slot: place
-    for place, slot in enumerate(
-        sorted({s for e in CATALOGUE.values() for s in e.slots}), STRIDE + 1
-    )
-}
+USED = sorted({slot for effect in CATALOGUE.values() for slot in effect.slots})
+FILLED = {slot: place for place, slot in enumerate(USED, STRIDE + 1)}
 """Where it is told, slot by slot, whether any effect is at work there: asked in every step."""
 
 

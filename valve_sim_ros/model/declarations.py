@@ -111,7 +111,8 @@ class EffectParameter(Parameter):
     are the values from which a search has to start where one start is not enough, and `step` its
     first step where costs are so narrow that the usual one would jump over them. `usual` is how
     far from neutral it usually lies, `positive` whether it never lies below: they decide where
-    data cannot.
+    data cannot. `shown` names what of the data shows where to start, if anything does: 'swings',
+    the frequencies at which the residual swings most, or 'steps', to whose multiples x keeps.
     """
 
     neutral: float = 0.0
@@ -120,6 +121,7 @@ class EffectParameter(Parameter):
     step: float = 0.0
     usual: tuple[float, ...] = ()
     positive: bool = False
+    shown: Literal['', 'swings', 'steps'] = ''
 
     def __post_init__(self) -> None:
         """Refuse a neutral value that is not legal."""

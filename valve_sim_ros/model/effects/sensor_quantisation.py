@@ -32,6 +32,7 @@ EFFECT = Effect(
             'Smallest change of measured x',
             starts=tuple(0.1 * 1.012**k for k in range(320)),
             step=0.004,
+            shown='steps',
         ),
     ),
     slots={'sensor_slot': sensor},

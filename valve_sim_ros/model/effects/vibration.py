@@ -47,6 +47,7 @@ EFFECT = Effect(
             'Frequency of the periodic force',
             step=1e-4,
             neutral=0.2,
+            shown='swings',
         ),
         EffectParameter(
             'phase',
