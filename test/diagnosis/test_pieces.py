@@ -124,7 +124,8 @@ def test_a_stem_put_to_rest_displaces_the_air_it_would_have_moved():
     record = recording(**effects)
     bench = Bench([record])
     start = {'p1_0': 0.0, 'p2_0': 0.0, 'x_0': 0.0}
-    stuck = complete({**VALUES, **start, **effects, 'f_s': 60.0})  # moves only where it is put
+    friction = {'f_s': 200.0, 'f_d': 200.0}  # moves only where it is put
+    stuck = complete({**VALUES, **start, **effects, **friction})
     (result,) = bench.run(stuck, ('chamber_volume',), ('x',))
     (free,) = bench.run({**stuck, 'chamber_volume.displacement': 0.0}, ('chamber_volume',), ('x',))
     dips = np.abs(result[1] - free[1])

@@ -45,17 +45,16 @@ def find_base(
     stems = STEMS if group.has_stem else ({},)
     starts = [{**valve.values, **stem, **there} for stem in stems for there in points]
     starts.append(dict(valve.values))
-    alone = group.stages == ('p2-x',)
-    if alone:
+    apart, most = [starts], FEW_STARTS
+    if group.stages == ('p2-x',):
         seen = fitter.bench.friction_seen(fitter.results(valve))
         starts += [{**valve.values, **there} for there in friction_grid(seen)]
-    apart = [starts]
-    if alone:  # of each share of friction one, or all end in the same valley
+        # of each share of friction one, or all end in the same valley
         shares = dict.fromkeys(start['f_d/f_s'] for start in starts)
         apart = [[start for start in starts if start['f_d/f_s'] == share] for share in shares]
+        most = 1
 
     def followed(way: Problem) -> list[Valve]:
-        most = 1 if alone else FEW_STARTS
         tried = [each for some in apart for each in fitter.scan(valve, some, way, most)]
         return sorted((fitter.fit(each, way, SHORT) for each in tried), key=by_cost)
 

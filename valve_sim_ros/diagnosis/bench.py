@@ -139,7 +139,7 @@ class Bench:
             theta,
             composition.finest,
             composition.effects,
-            np.zeros(composition.memory_size),
+            composition.memory,
             grid.forced,
             outputs,
             OUTPUTS.index(signal),

@@ -46,10 +46,10 @@ PLACES, EFFECTS_SIZE, MEMORY_SIZE = _places()
 
 
 class Composition(NamedTuple):
-    """What the compiled pipeline needs to know of the effects of one valve."""
+    """What the compiled pipeline needs of the effects of one valve; nothing is remembered yet."""
 
     effects: Array
-    memory_size: int
+    memory: Array
     finest: float
 
 
@@ -66,7 +66,12 @@ def compose(active: Iterable[str], values: Mapping[str, float]) -> Composition:
         finest = min(finest, effect.longest_step)
         stride = min(stride, effect.stride)
     effects[STRIDE] = stride
-    return Composition(effects, MEMORY_SIZE, finest)
+    return Composition(effects, np.full(MEMORY_SIZE, np.nan), finest)
+
+
+def memory_of(name: str) -> slice:
+    """Return the part of the memory that belongs to one effect."""
+    return slice(PLACES[name].memory, PLACES[name].memory + CATALOGUE[name].memory)
 
 
 def slot_function(slot: str) -> Any:
@@ -92,7 +97,7 @@ def slot_function(slot: str) -> Any:
 
 def _arguments(effect: Effect) -> str:
     """Return the call of one effect: its parameters as a tuple, its part of the memory."""
-    flag, memory = PLACES[effect.id]
+    flag, part = PLACES[effect.id].flag, memory_of(effect.id)
     own = ''.join(f'effects[{flag + 1 + index}], ' for index in range(len(effect.parameters)))
-    part = f'memory[{memory}:{memory + effect.memory}]' if effect.memory else '()'
-    return f'value, state, ({own}), {part}, dt'
+    memory = f'memory[{part.start}:{part.stop}]' if effect.memory else '()'
+    return f'value, state, ({own}), {memory}, dt'

@@ -149,7 +149,7 @@ class Effect:
     explanation, symptom, confirm : str
         What it is, what it does to the signals, and the test or topic that proves it.
     memory : int
-        Numbers it must remember from sample to sample.
+        Numbers it must remember from sample to sample; NaN at first, and when newly switched on.
     longest_step : float
         Longest step inside a sample for which its form is accurate [s].
     stride : float

@@ -1,6 +1,9 @@
 # Copyright 2026 The valve_sim_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What effects remember between steps: delayed signals, plays and lags."""
+"""What effects remember between steps: delayed signals, plays and lags.
+
+A memory full of NaN remembers nothing yet.
+"""
 
 import math
 from typing import Any
@@ -34,11 +37,12 @@ def delayed(value: float, now: float, delay: float, memory: Any) -> tuple[float,
         When the one took over from the other [s]; minus infinity if nothing changed yet.
     """
     room = (DELAY_SIZE - 3) // 2
-    first, last = int(memory[0]), int(memory[1])
-    if now == 0.0:
+    if math.isnan(memory[0]):
+        memory[0] = memory[1] = 0.0
         memory[2] = memory[3] = value
         memory[3 + room] = -math.inf
-    elif value != memory[3 + last]:
+    first, last = int(memory[0]), int(memory[1])
+    if value != memory[3 + last]:
         last = (last + 1) % room
         memory[3 + last] = value
         memory[3 + room + last] = now
@@ -72,7 +76,7 @@ def lagged(value: float, driven: float, time_constant: float, dt: float) -> floa
 
 
 @njit
-def mean_of_plays(value: float, width: float, memory: Any, first: bool) -> float:
+def mean_of_plays(value: float, width: float, memory: Any) -> float:
     """Return the mean of plays of evenly spread half-widths up to `width`.
 
     This is the Prandtl-Ishlinskii operator with a uniform density; `memory` holds one number per
@@ -82,7 +86,7 @@ def mean_of_plays(value: float, width: float, memory: Any, first: bool) -> float
     total = 0.0
     for index in range(count):
         half = width * (index + 1) / count
-        if first:
+        if math.isnan(memory[index]):
             memory[index] = value
         memory[index] = min(max(memory[index], value - half), value + half)
         total += memory[index]

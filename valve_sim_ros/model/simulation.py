@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from .composition import memory_of
 from .errors import ModelError
 from .kernels import Make, make
 from .parameters import SAMPLE_TIME
@@ -64,8 +65,8 @@ def drive(spec: ValveSpec) -> Drive:
     """Return what the functions of `machine(spec)` need, with the effects' memory empty."""
     if not spec.active:
         return Drive(spec.theta, BASE_STEP, NO_EFFECTS, NO_EFFECTS)
-    effects, memory_size, finest = spec.composition
-    return Drive(spec.theta, finest, effects, np.zeros(memory_size))
+    effects, memory, finest = spec.composition
+    return Drive(spec.theta, finest, effects, memory)
 
 
 @dataclass(frozen=True)
@@ -195,12 +196,14 @@ class Valve:
             Compile in a thread; if False, compile before returning.
         """
         self._initial = initial or InitialState()
+        self._spec = spec or ValveSpec()
+        self._drive = drive(self._spec)
         self._background = background
         self._make: Make | None = None
         self._compiled: Callable[..., float] | None = None
         self._state: Any = None
         self._first = True
-        self.spec = spec or ValveSpec()
+        self.spec = self._spec
         self.reset()
 
     @property
@@ -208,18 +211,19 @@ class Valve:
         """Parameters in force; assigning takes effect with the next sample.
 
         Another model, or effects where there were none, start the valve anew from where it is.
+        Effects that go on acting keep their memory; one that newly acts has none.
         """
         return self._spec
 
     @spec.setter
     def spec(self, spec: ValveSpec) -> None:
-        before = getattr(self, '_drive', None)
-        self._spec, self._drive = spec, drive(spec)
-        make = machine(spec)
+        after, make = drive(spec), machine(spec)
+        if make is self._make:
+            for name in set(spec.active) & set(self._spec.active):
+                after.memory[memory_of(name)] = self._drive.memory[memory_of(name)]
+        self._spec, self._drive = spec, after
         if make is not self._make:
             self._prepare(make)
-        elif before is not None:
-            self._drive = self._drive._replace(memory=before.memory)
 
     def reset(self, initial: InitialState | None = None) -> None:
         """Put the valve at rest in `initial` (its start by default) before a first sample."""

@@ -173,6 +173,23 @@ def test_chamber_dips_at_a_slip():
     assert s.p2[slip + 1] < s.p2[slip] - 1.0
 
 
+@pytest.mark.parametrize(
+    'effect', [('chamber_volume', 'displacement', 1.0), ('tubing_dead_time', 'dead_time', 2.0)]
+)
+def test_an_effect_switched_on_again_remembers_nothing(effect):
+    name, parameter, value = effect
+    without = ValveSpec().changed({**FAST, 'effects': ['sensor_calibration']})
+    both = without.changed({'effects': ['sensor_calibration', name], f'{name}.{parameter}': value})
+    valve = Valve(both, background=False)
+    for spec, u in ((both, 0.0), (without, 90.0)):
+        valve.spec = spec
+        for _ in range(300):
+            at_rest = valve.step(u, 0.2)
+    valve.spec = both
+    for _ in range(20):
+        assert valve.step(90.0, 0.2) == pytest.approx(at_rest, abs=0.01)
+
+
 def test_stem_stays_inside_the_stops():
     spec = {'effects': ['travel_stops'], 'travel_stops.lower': 10.0, 'travel_stops.upper': 70.0}
     s = simulate(commands(), parameters=spec, initial=InitialState(50.0, 50.0, 50.0))

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Chamber volume that grows as the valve opens."""
 
+import math
 from typing import Any
 
 from numba import njit
@@ -28,9 +29,9 @@ def motion(value: Any, state: Any, p: Any, memory: Any, dt: float) -> Motion:
     """
     ratio, displacement = p
     place = value.stem.x + 0.5 * dt * value.stem.v
-    before = max(1.0 + ratio * (memory[0] if memory[1] > 0.0 else state.x) / 100.0, 0.05)
+    before = max(1.0 + ratio * (state.x if math.isnan(memory[0]) else memory[0]) / 100.0, 0.05)
     after = max(1.0 + ratio * place / 100.0, 0.05)
-    memory[0], memory[1] = place, 1.0
+    memory[0] = place
     change = (value.p2 + ABSOLUTE) * (before / after - 1.0)
     return moved(value, value.stem, value.p2 + displacement * change)
 
@@ -65,7 +66,7 @@ EFFECT = Effect(
         ),
     ),
     slots={'flow_slot': flow, 'motion_slot': motion},
-    memory=2,
+    memory=1,
     stride=0.01,
     order=10,
     variants=(('ratio',), ('ratio', 'displacement')),

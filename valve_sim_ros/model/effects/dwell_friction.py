@@ -17,6 +17,8 @@ def force(value: Any, state: Any, p: Any, memory: Any, dt: float) -> tuple[float
     """Return static friction after the time at rest so far."""
     offset, f = value
     growth, time_constant = p
+    if math.isnan(memory[0]):
+        memory[0] = 0.0
     factor = 1.0 + growth * (1.0 - math.exp(-(memory[0] + 0.5 * dt) / time_constant))
     return offset, Friction(
         f.static_up * factor,

@@ -17,7 +17,7 @@ def inlet(value: float, state: Any, p: Any, memory: Any, dt: float) -> float:
     """Return the mean of plays of p1."""
     if p[0] <= 0.0:
         return value
-    return mean_of_plays(value, p[0], memory[:PLAYS], state.time + dt == 0.0)
+    return mean_of_plays(value, p[0], memory[:PLAYS])
 
 
 @njit
@@ -25,7 +25,7 @@ def sensor(value: float, state: Any, p: Any, memory: Any, dt: float) -> float:
     """Return the mean of plays of x."""
     if p[1] <= 0.0:
         return value
-    return mean_of_plays(value, p[1], memory[PLAYS:], state.time == 0.0)
+    return mean_of_plays(value, p[1], memory[PLAYS:])
 
 
 EFFECT = Effect(

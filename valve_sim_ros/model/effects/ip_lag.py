@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """First-order lag of the electro-pneumatic converter."""
 
+import math
 from typing import Any
 
 from numba import njit
@@ -13,7 +14,7 @@ from ..memory import lagged
 @njit
 def inlet(value: float, state: Any, p: Any, memory: Any, dt: float) -> float:
     """Return p1 on its way to what the converter asked for since the last step."""
-    if state.time + dt == 0.0:
+    if math.isnan(memory[0]):
         memory[0], memory[1] = state.p1, value
     before = memory[0]
     memory[0] = lagged(before, memory[1], p[0], dt)

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Play between the stem and its position sensor."""
 
+import math
 from typing import Any
 
 from numba import njit
@@ -13,7 +14,7 @@ from ..electro_pneumatic import backlash
 @njit
 def sensor(value: float, state: Any, p: Any, memory: Any, dt: float) -> float:
     """Return x behind a play of the given width."""
-    if state.time == 0.0:
+    if math.isnan(memory[0]):
         memory[0] = value
     memory[0] = backlash(memory[0], value, 0.5 * p[0])
     return memory[0]

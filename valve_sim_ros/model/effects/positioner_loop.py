@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """A positioner hidden between the command and the converter."""
 
+import math
 from typing import Any
 
 from numba import njit
@@ -13,6 +14,8 @@ from ..declarations import Effect, EffectParameter
 def command(value: float, state: Any, p: Any, memory: Any, dt: float) -> float:
     """Return the output of a PI controller of the stem position, u + K (u - x) + I."""
     gain, integral_gain, overdrive = p
+    if math.isnan(memory[0]):
+        memory[0] = 0.0
     error = value - (state.x + dt * state.v)  # at the end of the step
     raised = value + gain * error + memory[0]
     low, high = -overdrive, 100.0 + overdrive

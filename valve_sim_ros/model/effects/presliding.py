@@ -49,7 +49,7 @@ def motion(value: Any, state: Any, p: Any, memory: Any, dt: float) -> Motion:
     omega = math.sqrt(inertia * stiffness)
     b = Bristles(inertia, damping, stiffness, 2.0 * stiffness / omega, friction)
     x, v, z = state.x, state.v, memory[0]
-    if state.time == 0.0:
+    if math.isnan(z):
         force = value.target + value.excess - friction.stiffness * x
         z = min(max(force, -friction.static_down), friction.static_up) / stiffness
     count = math.ceil(dt / min(STEP, STABLE / (damping + 2.0 * omega)))

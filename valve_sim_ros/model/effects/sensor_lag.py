@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """First-order lag of the position sensor."""
 
+import math
 from typing import Any
 
 from numba import njit
@@ -13,7 +14,7 @@ from ..memory import lagged
 @njit
 def sensor(value: float, state: Any, p: Any, memory: Any, dt: float) -> float:
     """Return x behind a lag, driven by the mean of x over the step."""
-    if state.time == 0.0:
+    if math.isnan(memory[0]):
         memory[0] = memory[1] = value
     memory[0] = lagged(memory[0], 0.5 * (memory[1] + value), p[0], dt)
     memory[1] = value
