@@ -7,6 +7,8 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 import os
 
+from . import odds
+from .adequacy import leftover
 from .bench import Bench, MIXED_JITTER
 from .fitting import by_cost, eased, Fitter, NARROW, Problem, SHORT, Valve
 from .stages import Group
@@ -63,6 +65,10 @@ def find_base(
         return found[0]
     if not group.has_stem:
         return fitter.refined(found[0], problem)
+    best = fitter.fit(found[0], problem)
+    left = leftover(fitter.residuals(best, group.signal, drive))
+    if not odds.suspicious(left, group.signal, fitter.bench.mixed):
+        return best
     # put to rest where it was seen to rest, a stem that slips too late is only a little wrong
     way = eased(problem)
     eases = found if way == problem else followed(way)

@@ -7,6 +7,8 @@ from functools import cached_property
 import math
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
+from scipy.ndimage import median_filter
 from scipy.signal import find_peaks
 
 from ..identification.stretches import noise_of
@@ -17,14 +19,15 @@ from ..model.pipeline import Array
 from ..model.scoring import DOUBTFUL
 from ..recordings.recording import OUTPUTS, Recording
 from .errors import DiagnosisError
-from .stretch import Grid, Stretch
+from .stretch import Grid, HELD, Stretch
 
 OUTLIER = 6.0
 """A single value further than this from both its neighbours is an outlier [noise]."""
 JITTER = 0.1
 """Uncertainty of when a sample was taken, as a share of the period."""
-MIXED, LEAST_MIXED, MIXED_JITTER = 0.02, 3, 0.7
-"""Share and number of late commands from which arrivals are mixed; the uncertainty then."""
+ENOUGH_STEPS, LEAST_MIXED, MIXED, MIXED_JITTER = 6, 2, 0.02, 0.7
+"""From so many single steps of the command on, this number of late ones tells that arrivals are
+mixed; else this share of late samples. And the uncertainty of the time of a sample then."""
 LEAST_AT_REST = 0.3
 """Share of the samples of p1 that counts even so."""
 TRAVEL, MOST_UNSETTLED = 8.0, 0.1
@@ -75,6 +78,7 @@ class Bench:
             stretch.recount({n: np.where(settled, v, np.nan) for n, v in stretch.measured.items()})
             if 'x' in self.signals:
                 stretch.rests = _rests(stretch.measured['x'], self.noise['x'])
+                stretch.held = _smooth(stretch.measured['x'], self.noise['x'])
         self.size = sum(stretch.u.size for stretch in self.stretches)
 
     def run(
@@ -130,6 +134,8 @@ class Bench:
         """Run one stretch; return outputs on its grid, the grid, and the score of a signal."""
         composition = compose(effects, values)
         theta = np.array([*(values[name] for name in THETA), DELTA.default, 0.0])
+        if HELD in drive:
+            theta[STUCK] = IMMENSE
         grid = self.stretches[index].grid(values.get('phase', 0.0), tuple(drive))
         outputs = np.empty((len(OUTPUTS) + 1, grid.u.size))
         score = scored(bool(effects))(
@@ -204,16 +210,33 @@ class Bench:
         Parameters
         ----------
         results : sequence of ndarray
-            p1, p2, x of the base valve by stretch, shape (3, n), commands acting at once.
+            p1, p2, x of the base valve by stretch, shape (3, n), commands acting at once: needed
+            where single steps of the command are few.
         """
-        late = on_time = 0
+        late, on_time = self._answers_to_steps()
+        if late + on_time >= ENOUGH_STEPS:
+            return min(late, on_time) >= LEAST_MIXED
         for stretch, result in zip(self.stretches, results, strict=True):
             now, before = result[0, 1:], result[0, :-1]
             seen, noise = stretch.counts['p1'][1:], self.noise['p1']
             told = self._steps(result)[1:] > 8.0 * noise
             late += int(np.sum(told & (np.abs(seen - before) < 3.0 * noise)))
             on_time += int(np.sum(told & (np.abs(seen - now) < 3.0 * noise)))
-        return min(late, on_time) >= max(MIXED * (late + on_time), LEAST_MIXED)
+        return min(late, on_time) >= max(MIXED * (late + on_time), 3)
+
+    def _answers_to_steps(self) -> tuple[int, int]:
+        """Return how many single steps of the command p1 shows a sample late, and at once."""
+        late = on_time = 0
+        noise = self.noise['p1']
+        for stretch in self.stretches:
+            moves = np.diff(stretch.u) != 0.0
+            steps = np.flatnonzero(moves[:-1] & ~moves[1:])
+            before, at, after = (stretch.measured['p1'][steps + k] for k in range(3))
+            first, both = np.abs(at - before), np.abs(after - before)
+            large = both > 16.0 * noise
+            late += int(np.sum(large & (first < 4.0 * noise)))
+            on_time += int(np.sum(large & (first > 0.5 * both)))
+        return late, on_time
 
     def weigh_down(self, jitter: float, results: Sequence[Array]) -> None:
         """Let sample times be uncertain by this share of a period.
@@ -279,12 +302,28 @@ class Bench:
 
 THETA = ('f_d1', 'T_g1', 'T_g2', 'f_s', 'f_d', 'a_1', 'a_2')
 
+STUCK, IMMENSE = [THETA.index('f_s'), THETA.index('f_d')], 1e9
+"""Friction of a stem that moves only where it is put [% of span]."""
+NEAR, ALIKE = 15, 3.0
+"""Samples on either side over which x is smoothed, those that differ by less than this [noise]."""
+
+
+def _smooth(x: Array, noise: float) -> Array:
+    """Return x without most of its noise, slips kept: the sigma filter of Lee (1983)."""
+    known = np.flatnonzero(np.isfinite(x))
+    whole = np.interp(np.arange(x.size), known, x[known])
+    middle = median_filter(whole, 3, mode='nearest')
+    near = sliding_window_view(np.pad(whole, NEAR, mode='edge'), 2 * NEAR + 1)
+    alike = np.abs(near - middle[:, None]) < ALIKE * noise
+    return np.where(alike, near, 0.0).sum(axis=1) / np.maximum(alike.sum(axis=1), 1)
+
 
 def _wild(values: Array, limit: float) -> Array:
-    """Return which single values lie further than `limit` from the middle of three."""
+    """Return which single values lie further than `limit` from neighbours that agree."""
     wild = np.zeros(values.size, dtype=bool)
-    three = np.stack([values[:-2], values[1:-1], values[2:]])
-    wild[1:-1] = np.abs(values[1:-1] - np.median(three, axis=0)) > limit
+    before, value, after = values[:-2], values[1:-1], values[2:]
+    apart = np.abs(value - np.median([before, value, after], axis=0))
+    wild[1:-1] = apart > np.maximum(limit, np.abs(after - before))
     return wild
 
 

@@ -13,7 +13,6 @@ from ..model.spec import ValveSpec
 from ..recordings import read_recording
 from ..recordings.recording import OUTPUTS, Recording
 from . import odds
-from .adequacy import leftover
 from .base_valve import find_base, starting_valve
 from .bench import Bench
 from .conditions import Place, places
@@ -24,6 +23,7 @@ from .ladder import climb, concluded, Ladder
 from .proof import prove
 from .result import Diagnosis, Named
 from .stages import Candidate, Group, groups
+from .stretch import HELD
 from .unknowns import complete
 
 Data = Recording | str | os.PathLike[str]
@@ -205,9 +205,8 @@ def _climb_all(
         unknown = any(ladder.outcome == 'unknown_effect' for ladder in ladders)
         candidates = () if unknown else group.candidates(known)
         drive = fitter.drive
-        # stages to which later ones feed back are given what was measured of these; the first
-        # group was fitted just so already
-        fitter.drive = (*drive, *fitter.bench.signals[index + 1 :])
+        # stages to which later ones feed back are given what was measured of these
+        fitter.drive = (*drive, *_fed_back(fitter.bench, group, valve))
         ladder = climb(
             fitter,
             group,
@@ -219,8 +218,6 @@ def _climb_all(
             stops=stops,
         )
         fitter.drive = drive
-        if FEEDBACK & {rung.effect for rung in ladder.rungs}:
-            ladder = _settled(fitter, parts, ladder)
         ladder = concluded(ladder)
         unexplained = ladder.outcome == 'unknown_effect' and ladder.complete
         if unexplained and candidates and group.has_stem:
@@ -274,24 +271,11 @@ def _within(tell: Progress, start: float, width: float, text: str) -> Callable[[
     return lambda done: tell(start + width * done, text)
 
 
-FEEDBACK = {'positioner_loop', 'chamber_volume'}
-"""Effects by which the stem acts on the stages before it."""
-CYCLES = 2
-
-
-def _settled(fitter: Fitter, parts: Sequence[Group], ladder: Ladder) -> Ladder:
-    """Refit all stages in turn where a later one acts on an earlier one."""
-    valve = ladder.valve
-    for cycle in range(CYCLES):
-        for group in parts:
-            if cycle == 0 and group is not ladder.group:
-                valve = find_base(fitter, group, valve, fitter.drive)
-            else:
-                valve = fitter.fit(valve, fitter.problem(group, valve))
-    after = leftover(fitter.residuals(valve, ladder.group.signal))
-    if after.excess > ladder.after.excess:
-        return ladder
-    return replace(ladder, valve=valve, after=after)
+def _fed_back(bench: Bench, group: Group, valve: Valve) -> tuple[str, ...]:
+    """Return what drives a group beside what comes before it."""
+    if group.has_stem or 'x' not in bench.signals:
+        return ()
+    return (HELD,) if 'positioner_loop' in valve.effects or group.signal == 'p1' else ('x',)
 
 
 def _plain(

@@ -14,6 +14,9 @@ from ..model.pipeline import Array
 from ..recordings.recording import OUTPUTS
 
 KEPT_GRIDS = 60
+HELD = 'x held'
+"""Drive by which the stem is held, at every moment, where it was measured."""
+STEM = OUTPUTS.index('x')
 Rows = npt.NDArray[np.intp]
 
 
@@ -38,7 +41,7 @@ class Stretch:
     """A run of samples without a gap, shape (n,) each; outputs are NaN where lost.
 
     `counts` are the measured outputs where they count, `noise` their uncertainty, `rests` x
-    where it rests.
+    where it rests, `held` x smoothed between its slips.
     """
 
     time: Array
@@ -47,6 +50,7 @@ class Stretch:
     counts: dict[str, Array] = field(default_factory=dict)
     noise: dict[str, Array] = field(default_factory=dict)
     rests: Array = field(default_factory=lambda: np.empty(0))
+    held: Array = field(default_factory=lambda: np.empty(0))
     _grids: dict[Any, Grid] = field(default_factory=dict)
 
     @cached_property
@@ -100,6 +104,10 @@ class Stretch:
         rows = rows[:n]
         forced, nothing = np.full((3, time.size), np.nan), np.full(time.size, np.nan)
         for name in drive:
+            if name == HELD:
+                # what a loop sees at the end of a step
+                forced[STEM] = np.interp(np.append(time[order][1:], np.inf), self.time, self.held)
+                continue
             seen_there = self.rests if name == 'x' else self.measured[name]
             forced[OUTPUTS.index(name), rows] = seen_there
         targets, scales = {}, {}

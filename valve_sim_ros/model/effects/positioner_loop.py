@@ -13,9 +13,9 @@ from ..declarations import Effect, EffectParameter
 @njit
 def command(value: float, state: Any, p: Any, memory: Any, dt: float) -> float:
     """Return the output of a PI controller of the stem position, u + K (u - x) + I."""
-    gain, integral_gain, overdrive = p
+    gain, integral_gain, overdrive, initial = p
     if math.isnan(memory[0]):
-        memory[0] = 0.0
+        memory[0] = initial
     error = value - (state.x + dt * state.v)  # at the end of the step
     raised = value + gain * error + memory[0]
     low, high = -overdrive, 100.0 + overdrive
@@ -64,12 +64,28 @@ EFFECT = Effect(
             neutral=100.0,
             starts=(0.0,),
         ),
+        EffectParameter(
+            'initial_integral',
+            'I_0',
+            '%',
+            0.0,
+            -100.0,
+            100.0,
+            'linear',
+            'Integral part at the first sample',
+            starts=(0.0,),
+            step=0.5,
+        ),
     ),
     slots={'command_slot': command},
     memory=1,
     longest_step=0.01,
     order=0,
-    variants=(('gain',), ('gain', 'integral_gain'), ('gain', 'integral_gain', 'overdrive')),
+    variants=(
+        ('gain',),
+        ('gain', 'integral_gain', 'initial_integral'),
+        ('gain', 'integral_gain', 'initial_integral', 'overdrive'),
+    ),
     explanation='A positioner compares the stem with the command and drives the converter harder.',
     symptom='p1 moves while u rests, and overshoots after each step until the stem has followed.',
     confirm='Hold u after a step and watch p1; or bypass the positioner.',
