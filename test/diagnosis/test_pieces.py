@@ -20,6 +20,7 @@ from valve_sim_ros.diagnosis.evolution import evolve
 from valve_sim_ros.diagnosis.fitting import Fitter
 from valve_sim_ros.diagnosis.proof import closed
 from valve_sim_ros.diagnosis.stages import groups
+from valve_sim_ros.diagnosis.stretch import HELD
 from valve_sim_ros.diagnosis.unknowns import complete
 from valve_sim_ros.model.effects import CATALOGUE
 from valve_sim_ros.recordings.recording import Recording
@@ -130,6 +131,70 @@ def test_a_stem_put_to_rest_displaces_the_air_it_would_have_moved():
     (free,) = bench.run({**stuck, 'chamber_volume.displacement': 0.0}, ('chamber_volume',), ('x',))
     dips = np.abs(result[1] - free[1])
     assert dips.max() > 5.0
+
+
+def test_a_stem_is_put_to_rest_only_where_it_is_far_from_it():
+    record = recording(noise=0.2)
+    x = np.array(record.x)
+    x[np.random.default_rng(3).random(x.size) < 0.02] = np.nan
+    bench = Bench([Recording(record.time, record.u, record.p1, record.p2, x)])
+    start = {'p1_0': 0.0, 'p2_0': 0.0, 'x_0': 0.0}
+    right, stiff = complete({**VALUES, **start}), complete({**VALUES, **start, 'f_s': 9.0})
+    assert bench.score(right, (), 'x', ('x',)) == bench.score(right, (), 'x')
+    assert bench.score(stiff, (), 'x', ('x',)) < 0.8 * bench.score(stiff, (), 'x')
+
+
+def test_a_loop_is_seen_through_a_stem_held_where_it_was_measured():
+    loop = {
+        'positioner_loop.gain': 1.5,
+        'positioner_loop.integral_gain': 0.03,
+        'positioner_loop.initial_integral': 4.0,
+        'positioner_loop.overdrive': 20.0,
+    }
+    bench = Bench([recording(noise=0.2, **loop)])
+    wrong_stem = {**VALUES, 'f_s': 12.0, 'p1_0': 0.0, 'p2_0': 0.0, 'x_0': 0.0}
+    values = complete({**wrong_stem, **loop})
+
+    def excess(values, drive):
+        results = bench.run(values, ('positioner_loop',), drive)
+        return leftover(np.nan_to_num(bench.residual(results, 'p1'))).excess
+
+    held = excess(values, (HELD,))
+    assert held < 0.1 * excess(values, ())
+    assert held < 0.1 * excess({**values, 'positioner_loop.initial_integral': 0.0}, (HELD,))
+
+
+def test_single_steps_of_the_command_show_whether_arrivals_are_mixed():
+    record = recording(noise=0.1)
+    steps = np.flatnonzero(np.diff(record.u)) + 1
+    some = np.array(record.p1)
+    some[steps[::3]] = some[steps[::3] - 1]
+    each = np.array(record.p1)
+    each[steps] = each[steps - 1]
+    for p1, mixed in ((record.p1, False), (some, True), (each, False)):
+        bench = Bench([Recording(record.time, record.u, p1)])
+        wrong = [np.tile(1.2 * record.u, (4, 1))]  # an effect spoils the base valve
+        assert bench.mixed_arrivals(wrong) == mixed
+
+
+def test_an_outlier_is_a_value_that_neighbours_who_agree_do_not_share():
+    record = recording(noise=0.1)
+    p1 = np.array(record.p1)
+    step = np.flatnonzero(np.abs(np.diff(record.u)) > 20.0)[3]
+    p1[step + 1] += 0.3 * (p1[step + 1] - p1[step])  # a peak of the loop
+    p1[step + 20] += 5.0
+    measured = Bench([Recording(record.time, record.u, p1)]).stretches[0].measured['p1']
+    assert np.isfinite(measured[step + 1])
+    assert np.isnan(measured[step + 20])
+
+
+def test_a_search_for_growing_friction_starts_where_the_stem_holds_as_before():
+    group = groups(('x',))[0]
+    dwell = next(c for c in group.candidates() if c.effect == 'dwell_friction')
+    start = {**dwell.neutral, 'dwell_friction.growth': 0.6}
+    there = dwell.balanced(VALUES, start)
+    assert there['f_s'] * 1.6 == pytest.approx(VALUES['f_s'])
+    assert there['f_s'] * there['f_d/f_s'] == pytest.approx(VALUES['f_s'] * VALUES['f_d/f_s'])
 
 
 def test_data_show_where_a_signal_begins_and_what_holds_the_stem():

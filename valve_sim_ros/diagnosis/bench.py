@@ -8,6 +8,7 @@ import math
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
+import numpy.typing as npt
 from scipy.ndimage import median_filter
 from scipy.signal import find_peaks
 
@@ -38,6 +39,8 @@ BIN, LONG = 0.01, 32
 """Bins in which x is counted [%], and how much longer their spectrum is than the span."""
 SLACK = 0.03
 """By so much p2 may be off where the stem begins to slip [% of span]."""
+APART = 6.0
+"""A stem that is put to rest goes on by itself as long as it is this near [noise]."""
 LEAST_RESTS = 20
 """Samples at rest that show what holds the stem."""
 REST = 5
@@ -77,8 +80,9 @@ class Bench:
             settled = np.arange(stretch.u.size) >= self._settled(stretch)
             stretch.recount({n: np.where(settled, v, np.nan) for n, v in stretch.measured.items()})
             if 'x' in self.signals:
-                stretch.rests = _rests(stretch.measured['x'], self.noise['x'])
-                stretch.held = _smooth(stretch.measured['x'], self.noise['x'])
+                whole = _filled(stretch.measured['x'])
+                stretch.held = _smooth(whole, self.noise['x'])
+                stretch.rests = np.where(_still(whole, self.noise['x']), stretch.held, np.nan)
         self.size = sum(stretch.u.size for stretch in self.stretches)
 
     def run(
@@ -152,6 +156,7 @@ class Bench:
             grid.targets.get(signal, grid.nothing),
             grid.scales.get(signal, grid.nothing),
             SLACK,
+            0.0 if HELD in drive else APART * self.noise.get('x', 0.0),
             bound,
         )
         return outputs, grid, score
@@ -308,14 +313,27 @@ NEAR, ALIKE = 15, 3.0
 """Samples on either side over which x is smoothed, those that differ by less than this [noise]."""
 
 
+def _filled(values: Array) -> Array:
+    """Return a signal with straight lines across what was lost."""
+    known = np.flatnonzero(np.isfinite(values))
+    return np.interp(np.arange(values.size), known, values[known])
+
+
 def _smooth(x: Array, noise: float) -> Array:
     """Return x without most of its noise, slips kept: the sigma filter of Lee (1983)."""
-    known = np.flatnonzero(np.isfinite(x))
-    whole = np.interp(np.arange(x.size), known, x[known])
-    middle = median_filter(whole, 3, mode='nearest')
-    near = sliding_window_view(np.pad(whole, NEAR, mode='edge'), 2 * NEAR + 1)
+    middle = median_filter(x, 3, mode='nearest')
+    near = sliding_window_view(np.pad(x, NEAR, mode='edge'), 2 * NEAR + 1)
     alike = np.abs(near - middle[:, None]) < ALIKE * noise
     return np.where(alike, near, 0.0).sum(axis=1) / np.maximum(alike.sum(axis=1), 1)
+
+
+def _still(x: Array, noise: float) -> npt.NDArray[np.bool_]:
+    """Return where x has rested for a while: its last two means agree."""
+    total = np.concatenate([[0.0], np.cumsum(x)])
+    mean = (total[REST:] - total[:-REST]) / REST
+    still = np.zeros(x.size, dtype=bool)
+    still[2 * REST - 1 :] = np.abs(mean[REST:] - mean[:-REST]) < 2.0 * noise * np.sqrt(2.0 / REST)
+    return still
 
 
 def _wild(values: Array, limit: float) -> Array:
@@ -325,17 +343,3 @@ def _wild(values: Array, limit: float) -> Array:
     apart = np.abs(value - np.median([before, value, after], axis=0))
     wild[1:-1] = apart > np.maximum(limit, np.abs(after - before))
     return wild
-
-
-def _rests(x: Array, noise: float) -> Array:
-    """Return where x rests, its mean over the last REST samples; NaN elsewhere."""
-    known = np.nan_to_num(x, nan=np.nanmedian(x))
-    total = np.concatenate([[0.0], np.cumsum(known)])
-    mean = (total[REST:] - total[:-REST]) / REST
-    rests = np.full(x.size, np.nan)
-    ends = np.arange(2 * REST - 1, x.size)
-    still = np.abs(mean[ends - REST + 1] - mean[ends - 2 * REST + 1]) < 2.0 * noise * np.sqrt(
-        2.0 / REST
-    )
-    rests[ends[still]] = mean[ends - REST + 1][still]
-    return rests

@@ -257,7 +257,16 @@ def _second_look(
     drive = fitter.drive
     fitter.drive = (*drive, 'x')
     eased = concluded(
-        climb(fitter, group, ladder.valve, candidates, refit=True, progress=progress, stops=stops)
+        climb(
+            fitter,
+            group,
+            ladder.valve,
+            candidates,
+            refit=True,
+            sure=True,
+            progress=progress,
+            stops=stops,
+        )
     )
     fitter.drive = drive
     if eased.outcome != 'missing_effect':

@@ -94,6 +94,7 @@ def climb(
     *,
     refit: bool,
     carried: float = 0.0,
+    sure: bool = False,
     progress: Callable[[float], object],
     stops: tuple[type[BaseException], ...],
 ) -> Ladder:
@@ -113,6 +114,8 @@ def climb(
         Find the base valve's values in these stages anew.
     carried : float
         Excess that the signals before this one leave: no more than that says nothing.
+    sure : bool
+        That something is missing is known already.
     progress : callable
         Called with the share done.
     stops : tuple of type
@@ -131,7 +134,7 @@ def climb(
             return False
         if rungs:
             return left.excess > odds.CLEAN
-        return odds.suspicious(left, group.signal, fitter.bench.mixed)
+        return sure or odds.suspicious(left, group.signal, fitter.bench.mixed)
 
     now, before = base, base_left = seen(valve)
     with suppress(*stops):

@@ -129,7 +129,10 @@ def _screened(
     if len(own) > MOST_STARTS:
         costs = [fitter.scan(there, [{**usual, **start}], way)[0].cost for start in own]
         own = [own[index] for index in np.argsort(costs, kind='stable')[:FEWER_STARTS]]
-    starts = [[{**usual, **base, **start} for base in ({}, *frictions)] for start in own]
+    starts = [
+        [{**usual, **base, **start} for base in (candidate.balanced(usual, start), *frictions)]
+        for start in own
+    ]
 
     def best(way: Problem, count: int) -> list[Valve]:
         each = [fitter.scan(there, some, way)[0] for some in starts]

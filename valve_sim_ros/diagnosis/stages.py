@@ -49,6 +49,16 @@ class Candidate:
             {**self.neutral, **dict(zip(names, values, strict=True))} for values in product(*each)
         ]
 
+    def balanced(
+        self, values: Mapping[str, float], start: Mapping[str, float]
+    ) -> dict[str, float]:
+        """Return the friction with which a start holds the stem as the valve without it does."""
+        effect = CATALOGUE[self.effect]
+        if effect.balance is None:
+            return {}
+        factor = effect.balance(*(start[f'{self.effect}.{p.name}'] for p in effect.parameters))
+        return {'f_s': values['f_s'] * factor, 'f_d/f_s': min(values['f_d/f_s'] / factor, 1.0)}
+
 
 def starts_of(parameter: EffectParameter) -> tuple[float, ...]:
     """Return the declared starts, or some around the default on both sides of the neutral."""

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What it takes to declare a parameter or an option of the model, once."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 import math
 from numbers import Real
@@ -160,6 +160,9 @@ class Effect:
         Effects that look alike, each with what tells them apart.
     variants : tuple of tuple of str
         Alternative sets of parameters for a search to free; one set with all by default.
+    balance : callable, optional
+        Of its own parameters: by which factor f_s must change for the valve to hold its stem about
+        as it did without the effect. Searches start there too.
     references : tuple of str
         Where the physics comes from.
     """
@@ -178,6 +181,7 @@ class Effect:
     order: int = 0
     twins: Mapping[str, str] = field(default_factory=dict)
     variants: tuple[tuple[str, ...], ...] = ()
+    balance: Callable[..., float] | None = None
     references: tuple[str, ...] = ()
 
     @property

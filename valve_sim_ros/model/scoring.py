@@ -42,6 +42,7 @@ def run_scored(
     target: Array,
     scale: Array,
     slack: float,
+    apart: float,
     bound: float,
 ) -> float:
     """Take the valve through a record, stages driven by what was measured before them.
@@ -52,7 +53,7 @@ def run_scored(
         As for `run`; dt has shape (n,).
     measured : ndarray, shape (3, n)
         p1 and p2 that the stages after them receive, and the x at which the stem is put to rest
-        [% of span]; NaN where the model's own value goes on.
+        where it is not near [% of span]; NaN where the model's own value goes on.
     outputs : ndarray, shape (4, n)
         Receives p1, p2, x as the model has them before they are replaced [% of span], and 1 where
         the moment of a slip is in doubt, else 0.
@@ -65,6 +66,8 @@ def run_scored(
     slack : float
         As long as p2 is this close to where the stem begins to slip, the moment of the slip is in
         doubt; errors of x beyond DOUBTFUL do not count then [% of span].
+    apart : float
+        A stem no further than this from where it should rest goes on by itself [% of span].
     bound : float
         The run ends as soon as the score exceeds this.
 
@@ -113,7 +116,7 @@ def run_scored(
         if score - relief > bound:
             break
         p1, p2, rest = measured[0, k], measured[1, k], measured[2, k]
-        rests = rest == rest
+        rests = abs(rest - x) > apart
         moving = moving and not rests
         now = State(
             p1 if p1 == p1 else now.p1,

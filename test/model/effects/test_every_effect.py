@@ -190,6 +190,23 @@ def test_an_effect_switched_on_again_remembers_nothing(effect):
         assert valve.step(90.0, 0.2) == pytest.approx(at_rest, abs=0.01)
 
 
+@pytest.mark.parametrize(('shape', 'moves'), [(0.0, False), (1.0, True)])
+def test_friction_grows_with_the_rest_as_told(shape, moves):
+    # after 20 s at rest f_s is 4 (1 + 20/(20 + 20)) = 6.0, or 4 (1 + 1 - exp(-1)) = 6.5
+    spec = {
+        'f_d1': 0.0,
+        'T_g1': 0.02,
+        'f_s': 4.0,
+        'f_d': 2.0,
+        'effects': ['dwell_friction'],
+        'dwell_friction.growth': 1.0,
+        'dwell_friction.time_constant': 20.0,
+        'dwell_friction.shape': shape,
+    }
+    s = simulate(np.repeat([0.0, 6.3], (100, 20)), parameters=spec)
+    assert (s.x[-1] > 1.0) == moves
+
+
 def test_stem_stays_inside_the_stops():
     spec = {'effects': ['travel_stops'], 'travel_stops.lower': 10.0, 'travel_stops.upper': 70.0}
     s = simulate(commands(), parameters=spec, initial=InitialState(50.0, 50.0, 50.0))

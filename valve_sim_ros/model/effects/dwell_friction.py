@@ -11,15 +11,20 @@ from ..declarations import Effect, EffectParameter
 from ..state import Motion
 from ..stem import Friction
 
+EXPONENTIAL = 1e-3
+"""Shape below which the growth is as good as exponential."""
+
 
 @njit
 def force(value: Any, state: Any, p: Any, memory: Any, dt: float) -> tuple[float, Friction]:
     """Return static friction after the time at rest so far."""
     offset, f = value
-    growth, time_constant = p
+    growth, time_constant, shape = p
     if math.isnan(memory[0]):
         memory[0] = 0.0
-    factor = 1.0 + growth * (1.0 - math.exp(-(memory[0] + 0.5 * dt) / time_constant))
+    rest = (memory[0] + 0.5 * dt) / time_constant
+    left = math.exp(-rest) if shape < EXPONENTIAL else (1.0 + shape * rest) ** (-1.0 / shape)
+    factor = 1.0 + growth * (1.0 - left)
     return offset, Friction(
         f.static_up * factor,
         f.static_down * factor,
@@ -65,11 +70,24 @@ EFFECT = Effect(
             neutral=20.0,
             starts=(5.0, 25.0),
         ),
+        EffectParameter(
+            'shape',
+            'c',
+            '-',
+            0.0,
+            0.0,
+            1.0,
+            'linear',
+            '0: 1 - exp(-t/tau); 1: t/(t + tau); between: 1 - (1 + c t/tau)^(-1/c)',
+            starts=(1.0,),
+        ),
     ),
     slots={'force_slot': force, 'motion_slot': motion},
     memory=1,
     longest_step=0.1,
     order=50,
+    variants=(('growth', 'time_constant'), ('growth', 'time_constant', 'shape')),
+    balance=lambda growth, *_: 1.0 / (1.0 + growth),
     explanation='The packing creeps into the stem while it rests and holds it more firmly.',
     symptom='The first jump after a long rest is larger than those after short ones.',
     confirm='Equal steps after rests of 1 s, 10 s and 100 s.',
@@ -77,5 +95,7 @@ EFFECT = Effect(
         'linkage_backlash': 'a loose linkage hides the start of every reversal, whatever the rest',
         'stribeck_friction': 'that one depends on the speed, not on the rest',
     },
-    references=('Rising static friction, Armstrong-Helouvry, Dupont, Canudas de Wit 1994',),
+    references=(
+        'Rising static friction t/(t + tau), Armstrong-Helouvry, Dupont, Canudas de Wit 1994',
+    ),
 )
