@@ -20,7 +20,7 @@ from valve_sim_ros.diagnosis.evolution import evolve
 from valve_sim_ros.diagnosis.fitting import Fitter
 from valve_sim_ros.diagnosis.proof import closed
 from valve_sim_ros.diagnosis.stages import groups
-from valve_sim_ros.diagnosis.stretch import HELD
+from valve_sim_ros.diagnosis.stretch import CAUGHT, HELD
 from valve_sim_ros.diagnosis.unknowns import complete
 from valve_sim_ros.model.effects import CATALOGUE
 from valve_sim_ros.recordings.recording import Recording
@@ -140,8 +140,8 @@ def test_a_stem_is_put_to_rest_only_where_it_is_far_from_it():
     bench = Bench([Recording(record.time, record.u, record.p1, record.p2, x)])
     start = {'p1_0': 0.0, 'p2_0': 0.0, 'x_0': 0.0}
     right, stiff = complete({**VALUES, **start}), complete({**VALUES, **start, 'f_s': 9.0})
-    assert bench.score(right, (), 'x', ('x',)) == bench.score(right, (), 'x')
-    assert bench.score(stiff, (), 'x', ('x',)) < 0.8 * bench.score(stiff, (), 'x')
+    assert bench.score(right, (), 'x', (CAUGHT,)) == bench.score(right, (), 'x')
+    assert bench.score(stiff, (), 'x', (CAUGHT,)) < 0.8 * bench.score(stiff, (), 'x')
 
 
 def test_a_loop_is_seen_through_a_stem_held_where_it_was_measured():

@@ -20,7 +20,7 @@ from ..model.pipeline import Array
 from ..model.scoring import DOUBTFUL
 from ..recordings.recording import OUTPUTS, Recording
 from .errors import DiagnosisError
-from .stretch import Grid, HELD, Stretch
+from .stretch import CAUGHT, Grid, HELD, RESTS, Stretch
 
 OUTLIER = 6.0
 """A single value further than this from both its neighbours is an outlier [noise]."""
@@ -40,7 +40,7 @@ BIN, LONG = 0.01, 32
 SLACK = 0.03
 """By so much p2 may be off where the stem begins to slip [% of span]."""
 APART = 6.0
-"""A stem that is put to rest goes on by itself as long as it is this near [noise]."""
+"""A stem is caught where it is further than this from where it should rest [noise]."""
 LEAST_RESTS = 20
 """Samples at rest that show what holds the stem."""
 REST = 5
@@ -101,8 +101,9 @@ class Bench:
         effects : sequence of str
             The effects in force.
         drive : sequence of str
-            Signals that later stages receive as measured; with x, the stem is put where it was
-            seen to rest, so that a slip missed by the model does not spoil the next one.
+            Signals that later stages receive as measured; with x, or `CAUGHT` or `HELD`, the stem
+            is put where it was measured, so that a slip missed by the model does not spoil the
+            next one.
         """
         results = []
         for index in range(len(self.stretches)):
@@ -156,7 +157,7 @@ class Bench:
             grid.targets.get(signal, grid.nothing),
             grid.scales.get(signal, grid.nothing),
             SLACK,
-            0.0 if HELD in drive else APART * self.noise.get('x', 0.0),
+            APART * self.noise['x'] if CAUGHT in drive and RESTS not in drive else 0.0,
             bound,
         )
         return outputs, grid, score

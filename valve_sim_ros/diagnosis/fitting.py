@@ -13,17 +13,18 @@ from .bench import Bench
 from .descent import descend, walk
 from .evolution import evolve
 from .stages import Candidate, Group
+from .stretch import CAUGHT, PUT_TO_REST
 from .unknowns import complete, PHASE, to_point, to_values, Unknown
 
 HOPELESS = 1e3
 """Residual of a run that is not finite [noise]."""
-SHORT = 4
-"""Steps of a descent that only shows where it leads."""
+SHORT, LONG = 4, 20
+"""Steps of a descent that only shows where it leads, and of one to the bottom."""
 SPREAD, NARROW = 5.0, 3.0
 """Standard deviation with which an evolution begins, and near an optimum [steps of unknowns]."""
 POPULATION = 14
-MOST_TURNS = 3
-"""Most evolutions by which a valve is refined."""
+GENERATIONS, MOST_TURNS = 40, 3
+"""Generations of an evolution that refines a valve, and most evolutions in turn."""
 
 
 @dataclass(frozen=True)
@@ -42,9 +43,9 @@ Problem = tuple[tuple[Unknown, ...], str, tuple[str, ...]]
 
 
 def eased(problem: Problem) -> Problem:
-    """Return the problem in which the stem is put to rest where it was seen to rest."""
+    """Return the problem in which a stem is caught where it is far from its rest."""
     unknowns, signal, drive = problem
-    return problem if 'x' in drive else (unknowns, signal, (*drive, 'x'))
+    return problem if PUT_TO_REST & {*drive} else (unknowns, signal, (*drive, CAUGHT))
 
 
 def by_cost(valve: Valve) -> float:
@@ -94,7 +95,7 @@ class Fitter:
         score = self.bench.score(complete(valve.values), valve.effects, signal, drive, bound)
         return score if math.isfinite(score) else math.inf
 
-    def fit(self, valve: Valve, problem: Problem, most: int = 20) -> Valve:
+    def fit(self, valve: Valve, problem: Problem, most: int = LONG) -> Valve:
         """Return the valve at the bottom of the valley in which it stands."""
         unknowns, signal, drive = problem
 
@@ -142,9 +143,14 @@ class Fitter:
     def refined(self, valve: Valve, problem: Problem) -> Valve:
         """Return a valve after descents and, where costs are rugged, evolutions in turn."""
         valve = self.fit(valve, problem)
-        rugged = 'f_s' in (unknown.name for unknown in problem[0])
-        for _ in range(MOST_TURNS if rugged else 0):
-            more = self.evolve(valve, problem, 40, NARROW)
+        if 'f_s' not in (unknown.name for unknown in problem[0]):
+            return valve
+        way = eased(problem)
+        if way != problem:
+            eases = self.fit(self.evolve(valve, way, GENERATIONS, NARROW), way, SHORT)
+            valve = min(valve, self.fit(eases, problem), key=by_cost)
+        for _ in range(MOST_TURNS):
+            more = self.evolve(valve, problem, GENERATIONS, NARROW)
             more = self.fit(more, problem)
             ends = more.cost > 0.99 * valve.cost
             valve = min(valve, more, key=by_cost)

@@ -13,6 +13,7 @@ from .base_valve import find_base
 from .fitting import by_cost, Fitter, Valve
 from .race import in_reach, race, rebased
 from .stages import Candidate, Group
+from .stretch import PUT_TO_REST
 
 MOST_EFFECTS = 2
 """Most effects named in one group of stages."""
@@ -94,7 +95,6 @@ def climb(
     *,
     refit: bool,
     carried: float = 0.0,
-    sure: bool = False,
     progress: Callable[[float], object],
     stops: tuple[type[BaseException], ...],
 ) -> Ladder:
@@ -114,8 +114,6 @@ def climb(
         Find the base valve's values in these stages anew.
     carried : float
         Excess that the signals before this one leave: no more than that says nothing.
-    sure : bool
-        That something is missing is known already.
     progress : callable
         Called with the share done.
     stops : tuple of type
@@ -134,7 +132,7 @@ def climb(
             return False
         if rungs:
             return left.excess > odds.CLEAN
-        return sure or odds.suspicious(left, group.signal, fitter.bench.mixed)
+        return odds.suspicious(left, group.signal, fitter.bench.mixed)
 
     now, before = base, base_left = seen(valve)
     with suppress(*stops):
@@ -147,7 +145,7 @@ def climb(
             told = _within(progress, step)
             runners = race(fitter, group, now, candidates, told)
             # in the second look the stem is put to rest already, no valley of the base is missed
-            if group.has_stem and not rungs and 'x' not in fitter.drive:
+            if group.has_stem and not rungs and not PUT_TO_REST & {*fitter.drive}:
                 runners = deepened(fitter, group, now, runners, told)
             now = rebased(fitter, group, now, runners[:5])
             before = leftover(fitter.residuals(now, group.signal))

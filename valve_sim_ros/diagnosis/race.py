@@ -13,9 +13,10 @@ from scipy.signal import periodogram
 
 from ..model.pipeline import Array
 from .adequacy import leftover
-from .fitting import by_cost, eased, Fitter, Problem, SHORT, Valve
+from .fitting import by_cost, eased, Fitter, LONG, Problem, SHORT, Valve
 from .stages import Candidate, Group
 from .starts import friction_grid
+from .stretch import RESTS
 
 ROUNDS = ((40, 5), (10, 14), (4, 30))
 """Rounds of a race where costs are rugged: how many still run, and for how many generations."""
@@ -43,7 +44,8 @@ def race(
     frictions: Frictions = ()
     if group.has_stem:
         results = fitter.results(valve)
-        residual = np.nan_to_num(fitter.bench.residual(results, group.signal))
+        # whole slips would hide a swing
+        residual = fitter.residuals(valve, group.signal, (*fitter.drive, RESTS))
         seen = {'swings': _swings(fitter, residual), 'steps': fitter.bench.steps_of_x}
         frictions = friction_grid(fitter.bench.friction_seen(results))
     done = 0
@@ -141,7 +143,8 @@ def _screened(
     found = best(problem, SCREENED)
     if way != problem:
         found += [fitter.fit(each, way, SHORT) for each in best(way, 1)]
-    return min((fitter.fit(each, problem, SHORT) for each in found), key=by_cost)
+    steps = SHORT if group.has_stem else LONG
+    return min((fitter.fit(each, problem, steps) for each in found), key=by_cost)
 
 
 def _swings(fitter: Fitter, residual: Array) -> tuple[float, ...]:

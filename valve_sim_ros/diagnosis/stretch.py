@@ -14,8 +14,10 @@ from ..model.pipeline import Array
 from ..recordings.recording import OUTPUTS
 
 KEPT_GRIDS = 60
-HELD = 'x held'
-"""Drive by which the stem is held, at every moment, where it was measured."""
+RESTS, CAUGHT, HELD = 'x', 'x caught', 'x held'
+"""Drives by which a stem is put where it was measured: whenever that rests; only where it is far
+from there, which leaves a right valve alone; and at every moment."""
+PUT_TO_REST = {RESTS, CAUGHT}
 STEM = OUTPUTS.index('x')
 Rows = npt.NDArray[np.intp]
 
@@ -108,8 +110,10 @@ class Stretch:
                 # what a loop sees at the end of a step
                 forced[STEM] = np.interp(np.append(time[order][1:], np.inf), self.time, self.held)
                 continue
-            seen_there = self.rests if name == 'x' else self.measured[name]
-            forced[OUTPUTS.index(name), rows] = seen_there
+            if name in PUT_TO_REST:
+                forced[STEM, rows] = self.rests
+            else:
+                forced[OUTPUTS.index(name), rows] = self.measured[name]
         targets, scales = {}, {}
         for name, values in self.counts.items():
             targets[name], scales[name] = nothing.copy(), nothing.copy()
