@@ -307,3 +307,13 @@ def test_a_recording_may_begin_with_lost_samples():
         values[:5] = np.nan
     bench = Bench([Recording(record.time, record.u, **lost)])
     assert all(np.isfinite(value) for value in bench.stretches[0].first.values())
+
+
+def test_one_of_several_recordings_may_have_lost_x():
+    record = recording(noise=0.1)
+    lost = Recording(record.time, record.u, record.p1, record.p2, np.full(record.u.size, np.nan))
+    bench = Bench([record, lost])
+    right = complete(VALUES)
+    for drive in ((), (CAUGHT,), (HELD,)):
+        assert np.isfinite(bench.score(right, (), 'p1', drive))
+    assert bench.score(right, (), 'x') == pytest.approx(Bench([record]).score(right, (), 'x'))

@@ -26,9 +26,10 @@ OUTLIER = 6.0
 """A single value further than this from both its neighbours is an outlier [noise]."""
 JITTER = 0.1
 """Uncertainty of when a sample was taken, as a share of the period."""
-ENOUGH_STEPS, LEAST_MIXED, MIXED, MIXED_JITTER = 6, 2, 0.02, 0.7
-"""From so many single steps of the command on, this number of late ones tells that arrivals are
-mixed; else this share of late samples. And the uncertainty of the time of a sample then."""
+ENOUGH_STEPS, LEAST_EACH = 6, 2
+"""From so many single steps of the command on, so many late and on time tell of mixed arrivals."""
+MIXED, LEAST_MIXED, MIXED_JITTER = 0.02, 3, 0.7
+"""Else this share and number of samples does; and the uncertainty of the time of a sample then."""
 LEAST_AT_REST = 0.3
 """Share of the samples of p1 that counts even so."""
 TRAVEL, MOST_UNSETTLED = 8.0, 0.1
@@ -221,14 +222,14 @@ class Bench:
         """
         late, on_time = self._answers_to_steps()
         if late + on_time >= ENOUGH_STEPS:
-            return min(late, on_time) >= LEAST_MIXED
+            return min(late, on_time) >= LEAST_EACH
         for stretch, result in zip(self.stretches, results, strict=True):
             now, before = result[0, 1:], result[0, :-1]
             seen, noise = stretch.counts['p1'][1:], self.noise['p1']
             told = self._steps(result)[1:] > 8.0 * noise
             late += int(np.sum(told & (np.abs(seen - before) < 3.0 * noise)))
             on_time += int(np.sum(told & (np.abs(seen - now) < 3.0 * noise)))
-        return min(late, on_time) >= max(MIXED * (late + on_time), 3)
+        return min(late, on_time) >= max(MIXED * (late + on_time), LEAST_MIXED)
 
     def _answers_to_steps(self) -> tuple[int, int]:
         """Return how many single steps of the command p1 shows a sample late, and at once."""
@@ -293,6 +294,8 @@ class Bench:
         """
         values = stretch.measured[self.signals[-1]]
         known = np.flatnonzero(np.isfinite(values))
+        if not known.size:
+            return 0
         moved = np.abs(values[known] - values[known[0]]) > max(
             TRAVEL, OUTLIER * self.noise[self.signals[-1]]
         )
@@ -317,6 +320,8 @@ NEAR, ALIKE = 15, 3.0
 def _filled(values: Array) -> Array:
     """Return a signal with straight lines across what was lost."""
     known = np.flatnonzero(np.isfinite(values))
+    if not known.size:
+        return values
     return np.interp(np.arange(values.size), known, values[known])
 
 
