@@ -69,7 +69,7 @@ def find_base(
     left = leftover(fitter.residuals(best, group.signal, drive))
     if not odds.suspicious(left, group.signal, fitter.bench.mixed):
         return best
-    # put to rest where it was seen to rest, a stem that slips too late is only a little wrong
+    # caught where it is far from its rest, a stem that slips too late is only a little wrong
     way = eased(problem)
     eases = found if way == problem else followed(way)
 

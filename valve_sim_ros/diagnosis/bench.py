@@ -7,10 +7,6 @@ from functools import cached_property
 import math
 
 import numpy as np
-from numpy.lib.stride_tricks import sliding_window_view
-import numpy.typing as npt
-from scipy.ndimage import median_filter
-from scipy.signal import find_peaks
 
 from ..identification.stretches import noise_of
 from ..model.composition import compose
@@ -20,6 +16,7 @@ from ..model.pipeline import Array
 from ..model.scoring import DOUBTFUL
 from ..recordings.recording import OUTPUTS, Recording
 from .errors import DiagnosisError
+from .readings import answers_to_steps, filled, smooth, steps_kept, still, wild
 from .stretch import CAUGHT, Grid, HELD, RESTS, Stretch
 
 OUTLIER = 6.0
@@ -34,18 +31,12 @@ LEAST_AT_REST = 0.3
 """Share of the samples of p1 that counts even so."""
 TRAVEL, MOST_UNSETTLED = 8.0, 0.1
 """A record counts once the valve has travelled this far [%], or after this share."""
-FINEST, COARSEST, ON_STEPS, MOST_STEPS = 0.1, 10.0, 0.6, 3
-"""Steps of a coarse sensor [%], how well x keeps to them (1: exactly), and how many are told."""
-BIN, LONG = 0.01, 32
-"""Bins in which x is counted [%], and how much longer their spectrum is than the span."""
 SLACK = 0.03
 """By so much p2 may be off where the stem begins to slip [% of span]."""
 APART = 6.0
 """A stem is caught where it is further than this from where it should rest [noise]."""
 LEAST_RESTS = 20
 """Samples at rest that show what holds the stem."""
-REST = 5
-"""Samples over which two means agree while the stem rests."""
 
 
 class Bench:
@@ -76,14 +67,14 @@ class Bench:
         }
         for stretch in self.stretches:
             for name, values in stretch.measured.items():
-                values[_wild(values, OUTLIER * self.noise[name])] = np.nan
+                values[wild(values, OUTLIER * self.noise[name])] = np.nan
             stretch.noise = {n: self._uncertainty(n, v) for n, v in stretch.measured.items()}
             settled = np.arange(stretch.u.size) >= self._settled(stretch)
             stretch.recount({n: np.where(settled, v, np.nan) for n, v in stretch.measured.items()})
             if 'x' in self.signals:
-                whole = _filled(stretch.measured['x'])
-                stretch.held = _smooth(whole, self.noise['x'])
-                stretch.rests = np.where(_still(whole, self.noise['x']), stretch.held, np.nan)
+                whole = filled(stretch.measured['x'])
+                stretch.held = smooth(whole, self.noise['x'])
+                stretch.rests = np.where(still(whole, self.noise['x']), stretch.held, np.nan)
         self.size = sum(stretch.u.size for stretch in self.stretches)
 
     def run(
@@ -220,30 +211,18 @@ class Bench:
             p1, p2, x of the base valve by stretch, shape (3, n), commands acting at once: needed
             where single steps of the command are few.
         """
-        late, on_time = self._answers_to_steps()
+        noise = self.noise['p1']
+        each = [answers_to_steps(s.u, s.measured['p1'], noise) for s in self.stretches]
+        late, on_time = map(sum, zip(*each, strict=True))
         if late + on_time >= ENOUGH_STEPS:
             return min(late, on_time) >= LEAST_EACH
         for stretch, result in zip(self.stretches, results, strict=True):
             now, before = result[0, 1:], result[0, :-1]
-            seen, noise = stretch.counts['p1'][1:], self.noise['p1']
+            seen = stretch.counts['p1'][1:]
             told = self._steps(result)[1:] > 8.0 * noise
             late += int(np.sum(told & (np.abs(seen - before) < 3.0 * noise)))
             on_time += int(np.sum(told & (np.abs(seen - now) < 3.0 * noise)))
         return min(late, on_time) >= max(MIXED * (late + on_time), LEAST_MIXED)
-
-    def _answers_to_steps(self) -> tuple[int, int]:
-        """Return how many single steps of the command p1 shows a sample late, and at once."""
-        late = on_time = 0
-        noise = self.noise['p1']
-        for stretch in self.stretches:
-            moves = np.diff(stretch.u) != 0.0
-            steps = np.flatnonzero(moves[:-1] & ~moves[1:])
-            before, at, after = (stretch.measured['p1'][steps + k] for k in range(3))
-            first, both = np.abs(at - before), np.abs(after - before)
-            large = both > 16.0 * noise
-            late += int(np.sum(large & (first < 4.0 * noise)))
-            on_time += int(np.sum(large & (first > 0.5 * both)))
-        return late, on_time
 
     def weigh_down(self, jitter: float, results: Sequence[Array]) -> None:
         """Let sample times be uncertain by this share of a period.
@@ -264,19 +243,7 @@ class Bench:
         """Steps to whose multiples x keeps, the likeliest first [% of span]; mostly none."""
         if 'x' not in self.signals:
             return ()
-        x = np.concatenate([s.measured['x'] for s in self.stretches])
-        x = x[(x >= 0.0) & (x < 100.0)]
-        counts = np.histogram(x, round(100.0 / BIN), (0.0, 100.0))[0]
-        # 1 where all x are multiples of one over the frequency, near 0 where they are anywhere
-        length = LONG * counts.size
-        frequency = np.fft.rfftfreq(length, BIN)
-        middle = np.exp(-1j * np.pi * frequency * BIN)  # of the first bin
-        kept = (np.fft.rfft(counts, length) * middle).real / max(x.size, 1)
-        inside = (frequency > 1.0 / COARSEST) & (frequency < 1.0 / FINEST)
-        peaks = find_peaks(np.where(inside, kept, 0.0), height=ON_STEPS)[0]
-        alike = np.minimum(kept[peaks], 0.95 * kept[peaks].max(initial=0.0))  # halves of a step
-        likeliest = peaks[np.argsort(-alike, kind='stable')[:MOST_STEPS]]
-        return tuple((1.0 / frequency[likeliest]).tolist())
+        return steps_kept(np.concatenate([s.measured['x'] for s in self.stretches]))
 
     @property
     def mixed(self) -> bool:
@@ -313,39 +280,3 @@ THETA = ('f_d1', 'T_g1', 'T_g2', 'f_s', 'f_d', 'a_1', 'a_2')
 
 STUCK, IMMENSE = [THETA.index('f_s'), THETA.index('f_d')], 1e9
 """Friction of a stem that moves only where it is put [% of span]."""
-NEAR, ALIKE = 15, 3.0
-"""Samples on either side over which x is smoothed, those that differ by less than this [noise]."""
-
-
-def _filled(values: Array) -> Array:
-    """Return a signal with straight lines across what was lost."""
-    known = np.flatnonzero(np.isfinite(values))
-    if not known.size:
-        return values
-    return np.interp(np.arange(values.size), known, values[known])
-
-
-def _smooth(x: Array, noise: float) -> Array:
-    """Return x without most of its noise, slips kept: the sigma filter of Lee (1983)."""
-    middle = median_filter(x, 3, mode='nearest')
-    near = sliding_window_view(np.pad(x, NEAR, mode='edge'), 2 * NEAR + 1)
-    alike = np.abs(near - middle[:, None]) < ALIKE * noise
-    return np.where(alike, near, 0.0).sum(axis=1) / np.maximum(alike.sum(axis=1), 1)
-
-
-def _still(x: Array, noise: float) -> npt.NDArray[np.bool_]:
-    """Return where x has rested for a while: its last two means agree."""
-    total = np.concatenate([[0.0], np.cumsum(x)])
-    mean = (total[REST:] - total[:-REST]) / REST
-    still = np.zeros(x.size, dtype=bool)
-    still[2 * REST - 1 :] = np.abs(mean[REST:] - mean[:-REST]) < 2.0 * noise * np.sqrt(2.0 / REST)
-    return still
-
-
-def _wild(values: Array, limit: float) -> Array:
-    """Return which single values lie further than `limit` from neighbours that agree."""
-    wild = np.zeros(values.size, dtype=bool)
-    before, value, after = values[:-2], values[1:-1], values[2:]
-    apart = np.abs(value - np.median([before, value, after], axis=0))
-    wild[1:-1] = apart > np.maximum(limit, np.abs(after - before))
-    return wild

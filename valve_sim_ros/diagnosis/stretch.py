@@ -109,8 +109,7 @@ class Stretch:
             if name == HELD:
                 # what a loop sees at the end of a step
                 forced[STEM] = np.interp(np.append(time[order][1:], np.inf), self.time, self.held)
-                continue
-            if name in PUT_TO_REST:
+            elif name in PUT_TO_REST:
                 forced[STEM, rows] = self.rests
             else:
                 forced[OUTPUTS.index(name), rows] = self.measured[name]

@@ -46,7 +46,7 @@ PLACES, EFFECTS_SIZE, MEMORY_SIZE = _places()
 
 
 class Composition(NamedTuple):
-    """What the compiled pipeline needs of the effects of one valve; nothing is remembered yet."""
+    """What the compiled pipeline needs of the effects of one valve; they remember nothing yet."""
 
     effects: Array
     memory: Array
@@ -55,10 +55,12 @@ class Composition(NamedTuple):
 
 def compose(active: Iterable[str], values: Mapping[str, float]) -> Composition:
     """Return the effects in force with their parameters by full name."""
-    effects, finest, stride = np.zeros(EFFECTS_SIZE), BASE_STEP, BASE_STEP
+    effects, memory = np.zeros(EFFECTS_SIZE), np.empty(MEMORY_SIZE)
+    finest = stride = BASE_STEP
     for name in active:
         effect, flag = CATALOGUE[name], PLACES[name].flag
         effects[flag] = 1.0
+        memory[memory_of(name)] = np.nan  # the rest is never read
         for offset, parameter in enumerate(effect.parameters, 1):
             effects[flag + offset] = values[f'{name}.{parameter.name}']
         for slot in effect.slots:
@@ -66,7 +68,7 @@ def compose(active: Iterable[str], values: Mapping[str, float]) -> Composition:
         finest = min(finest, effect.longest_step)
         stride = min(stride, effect.stride)
     effects[STRIDE] = stride
-    return Composition(effects, np.full(MEMORY_SIZE, np.nan), finest)
+    return Composition(effects, memory, finest)
 
 
 def memory_of(name: str) -> slice:

@@ -197,13 +197,13 @@ class Valve:
         """
         self._initial = initial or InitialState()
         self._spec = spec or ValveSpec()
-        self._drive = drive(self._spec)
+        self._drive: Drive
         self._background = background
         self._make: Make | None = None
         self._compiled: Callable[..., float] | None = None
         self._state: Any = None
         self._first = True
-        self.spec = self._spec
+        self._prepare(machine(self._spec))
         self.reset()
 
     @property
@@ -217,13 +217,14 @@ class Valve:
 
     @spec.setter
     def spec(self, spec: ValveSpec) -> None:
-        after, make = drive(spec), machine(spec)
-        if make is self._make:
-            for name in set(spec.active) & set(self._spec.active):
-                after.memory[memory_of(name)] = self._drive.memory[memory_of(name)]
-        self._spec, self._drive = spec, after
+        acted, self._spec = self._spec.active, spec
+        make = machine(spec)
         if make is not self._make:
             self._prepare(make)
+            return
+        memory, self._drive = self._drive.memory, drive(spec)
+        for name in set(acted) & set(spec.active):
+            self._drive.memory[memory_of(name)] = memory[memory_of(name)]
 
     def reset(self, initial: InitialState | None = None) -> None:
         """Put the valve at rest in `initial` (its start by default) before a first sample."""

@@ -1,0 +1,85 @@
+# Copyright 2026 The valve_sim_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""What a measured signal shows by itself, without a model beside it."""
+
+import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
+import numpy.typing as npt
+from scipy.ndimage import median_filter
+from scipy.signal import find_peaks
+
+from ..model.pipeline import Array
+
+FINEST, COARSEST, ON_STEPS, MOST_STEPS = 0.1, 10.0, 0.6, 3
+"""Steps of a coarse sensor [%], how well x keeps to them (1: exactly), and how many are told."""
+BIN, LONG = 0.01, 32
+"""Bins in which x is counted [%], and how much longer their spectrum is than the span."""
+REST = 5
+"""Samples over which two means agree while the stem rests."""
+NEAR, ALIKE = 15, 3.0
+"""Samples on either side over which x is smoothed, those that differ by less than this [noise]."""
+LARGE, UNMOVED, ANSWERED = 16.0, 4.0, 0.5
+"""A step of p1 that tells when it came; p1 has not moved yet; and part of it seen at once [noise,
+noise, share]."""
+Mask = npt.NDArray[np.bool_]
+
+
+def filled(values: Array) -> Array:
+    """Return a signal with straight lines across what was lost."""
+    known = np.flatnonzero(np.isfinite(values))
+    if not known.size:
+        return values
+    return np.interp(np.arange(values.size), known, values[known])
+
+
+def smooth(x: Array, noise: float) -> Array:
+    """Return x without most of its noise, slips kept: the sigma filter of Lee (1983)."""
+    middle = median_filter(x, 3, mode='nearest')
+    near = sliding_window_view(np.pad(x, NEAR, mode='edge'), 2 * NEAR + 1)
+    alike = np.abs(near - middle[:, None]) < ALIKE * noise
+    return np.where(alike, near, 0.0).sum(axis=1) / np.maximum(alike.sum(axis=1), 1)
+
+
+def still(x: Array, noise: float) -> Mask:
+    """Return where x has rested for a while: its last two means agree."""
+    total = np.concatenate([[0.0], np.cumsum(x)])
+    mean = (total[REST:] - total[:-REST]) / REST
+    still = np.zeros(x.size, dtype=bool)
+    still[2 * REST - 1 :] = np.abs(mean[REST:] - mean[:-REST]) < 2.0 * noise * np.sqrt(2.0 / REST)
+    return still
+
+
+def wild(values: Array, limit: float) -> Mask:
+    """Return which single values lie further than `limit` from neighbours that agree."""
+    wild = np.zeros(values.size, dtype=bool)
+    before, value, after = values[:-2], values[1:-1], values[2:]
+    apart = np.abs(value - np.median([before, value, after], axis=0))
+    wild[1:-1] = apart > np.maximum(limit, np.abs(after - before))
+    return wild
+
+
+def answers_to_steps(u: Array, p1: Array, noise: float) -> tuple[int, int]:
+    """Return how many single steps of the command p1 shows a sample late, and at once."""
+    moves = np.diff(u) != 0.0
+    steps = np.flatnonzero(moves[:-1] & ~moves[1:])
+    before, at, after = (p1[steps + k] for k in range(3))
+    first, both = np.abs(at - before), np.abs(after - before)
+    large = both > LARGE * noise
+    late = large & (first < UNMOVED * noise)
+    return int(late.sum()), int((large & (first > ANSWERED * both)).sum())
+
+
+def steps_kept(x: Array) -> tuple[float, ...]:
+    """Return the steps to whose multiples x keeps, the likeliest first [% of span]."""
+    x = x[(x >= 0.0) & (x < 100.0)]
+    counts = np.histogram(x, round(100.0 / BIN), (0.0, 100.0))[0]
+    # 1 where all x are multiples of one over the frequency, near 0 where they are anywhere
+    length = LONG * counts.size
+    frequency = np.fft.rfftfreq(length, BIN)
+    middle = np.exp(-1j * np.pi * frequency * BIN)  # of the first bin
+    kept = (np.fft.rfft(counts, length) * middle).real / max(x.size, 1)
+    inside = (frequency > 1.0 / COARSEST) & (frequency < 1.0 / FINEST)
+    peaks = find_peaks(np.where(inside, kept, 0.0), height=ON_STEPS)[0]
+    alike = np.minimum(kept[peaks], 0.95 * kept[peaks].max(initial=0.0))  # halves of a step
+    likeliest = peaks[np.argsort(-alike, kind='stable')[:MOST_STEPS]]
+    return tuple((1.0 / frequency[likeliest]).tolist())
