@@ -8,7 +8,7 @@ from dataclasses import replace
 import math
 import os
 
-from ..identification.watch import Stop
+from ..identification.watch import Progress, Stop
 from ..model.spec import ValveSpec
 from ..recordings import read_recording
 from ..recordings.recording import OUTPUTS, Recording
@@ -27,7 +27,6 @@ from .stretch import CAUGHT, HELD, RESTS
 from .unknowns import complete
 
 Data = Recording | str | os.PathLike[str]
-Progress = Callable[[float, str], object]
 
 
 def diagnose(

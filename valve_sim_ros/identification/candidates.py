@@ -113,7 +113,7 @@ def narrow(
     steps: Array,
     keep: int,
     fine: int,
-    progress: Callable[[float], None],
+    progress: Callable[[float], object],
 ) -> Array:
     """Return the best point found from a grid of starts, by scans along lines and finer grids.
 
@@ -158,7 +158,7 @@ def descend(
     starts: Array,
     most: int,
     evaluations: int,
-    progress: Callable[[float], None],
+    progress: Callable[[float], object],
 ) -> Array:
     """Return the best point that Nelder-Mead's simplices find.
 

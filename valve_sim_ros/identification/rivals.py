@@ -163,7 +163,7 @@ def _held(values: Array) -> Array:
 def _search(
     candidates: Candidates,
     base: Identification | None,
-    progress: Callable[[float], None] = lambda share: None,
+    progress: Callable[[float], object] = lambda share: None,
 ) -> Array:
     """Return the best point."""
     if candidates.model.data_driven:

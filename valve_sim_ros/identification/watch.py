@@ -8,7 +8,7 @@ import time
 
 from .descent import End
 
-Progress = Callable[[float, str], None]
+Progress = Callable[[float, str], object]
 """Called with the share done, 0 to 1, and what is being done; may raise `Stop`."""
 
 BETWEEN = 0.05
