@@ -81,6 +81,35 @@ SAME = {
     'sensor_drift': ({'sensor_drift': 0.01}, {'rate': 36.0}),
 }
 
+OTHER_FORMS = [
+    (
+        'nonlinear_flow',
+        {'flow_critical': 0.3, 'flow_absolute': 60.0},
+        {'exponent': 1.0, 'critical_ratio': 0.3, 'absolute_pressure': 60.0},
+    ),
+    (
+        'hysteresis',
+        {'hysteresis_kind': 2.0, 'hysteresis_size': 3.0, 'hysteresis_width': 5.4},
+        {'inlet_width': 0.0, 'command_width': 3.0, 'reach': 1.8},
+    ),
+    (
+        'hysteresis',
+        {
+            'hysteresis_kind': 2.0,
+            'hysteresis_at': 1.0,
+            'hysteresis_size': 2.0,
+            'hysteresis_width': 3.0,
+        },
+        {'inlet_width': 0.0, 'stem_width': 2.0, 'reach': 1.5},
+    ),
+    (
+        'dwell_friction',
+        {'dwell_gain': 0.8, 'dwell_time': 10.0, 'dwell_rational': 1.0},
+        {'growth': 0.8, 'time_constant': 10.0, 'shape': 1.0},
+    ),
+    ('air_leak', {'leak': 0.02, 'leak_orifice': 1.0}, {'leak_rate': 0.02, 'exponent': 0.5}),
+]
+
 
 def both(changes, values):
     """Return the traces of the blind simulator and of the model."""
@@ -105,9 +134,11 @@ def test_that_the_base_valve_agrees():
     assert disagreement(*both({}, {})) < 0.05
 
 
-@pytest.mark.parametrize('effect', SAME)
-def test_that_an_effect_agrees(effect):
-    changes, values = SAME[effect]
+@pytest.mark.parametrize(
+    ('effect', 'changes', 'values'),
+    [*((effect, *same) for effect, same in SAME.items()), *OTHER_FORMS],
+)
+def test_that_an_effect_agrees(effect, changes, values):
     named = {f'{effect}.{name}': value for name, value in values.items()}
     blind, modelled = both(changes, {'effects': [effect], **named})
     plain, _ = both({}, {})

@@ -82,16 +82,18 @@ def twin_limit(gained: float, share: float = TWIN_SHARE) -> float:
 
 
 def surprise(valve: Valve) -> int:
-    """Return how odd a fitted effect would be: parameters, and sizes out of the usual."""
+    """Return how odd a fitted effect is: parameters of wrong sign, too large, or all too small."""
     candidate = valve.candidates[-1]
-    odd = 0
+    odd, sizes = 0, []
     for name in candidate.names:
         parameter = declared(candidate.effect, name)
-        size = abs(valve.values[f'{candidate.effect}.{name}'] - parameter.neutral)
-        odd += bool(parameter.usual) and not parameter.usual[0] <= size <= parameter.usual[1]
-        if parameter.positive and valve.values[f'{candidate.effect}.{name}'] < parameter.neutral:
-            odd += 1
-    return odd
+        change = valve.values[f'{candidate.effect}.{name}'] - parameter.neutral
+        odd += parameter.positive and change < 0.0
+        if parameter.usual:
+            least, most = parameter.usual
+            odd += abs(change) > most
+            sizes.append(abs(change) / least)
+    return odd + (max(sizes, default=1.0) < 1.0)
 
 
 def further(gained: float, before: Leftover) -> bool:
@@ -107,12 +109,16 @@ def needed(base: Leftover, before: Leftover, closed: float, after: Leftover) -> 
     return share >= MORE_SHARE and (closed >= MORE_CLOSED or explained)
 
 
+def look_alike(one: str, other: str) -> bool:
+    """Tell whether either of two effects is declared to look like the other."""
+    return other in CATALOGUE[one].twins or one in CATALOGUE[other].twins
+
+
 def close_rivals(gains: Mapping[str, float], best: str) -> list[str]:
     """Return the effects that the data do not tell from the best, closest first."""
 
     def limit(name: str) -> float:
-        known = name in CATALOGUE[best].twins or best in CATALOGUE[name].twins
-        return twin_limit(gains[best], KNOWN_TWIN_SHARE if known else TWIN_SHARE)
+        return twin_limit(gains[best], KNOWN_TWIN_SHARE if look_alike(name, best) else TWIN_SHARE)
 
     near = [name for name in gains if name != best and gains[best] - gains[name] < limit(name)]
     return sorted(near, key=lambda name: -gains[name])

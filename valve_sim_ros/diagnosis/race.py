@@ -11,7 +11,9 @@ import os
 import numpy as np
 from scipy.signal import periodogram
 
+from ..model.effects import CATALOGUE
 from ..model.pipeline import Array
+from . import odds
 from .adequacy import leftover
 from .fitting import by_cost, eased, Fitter, LONG, Problem, SHORT, Valve
 from .stages import Candidate, Group
@@ -69,12 +71,19 @@ def race(
     def refined(runner: Valve) -> Valve:
         return fitter.refined(runner, fitter.problem(group, runner))
 
+    def excess(runner: Valve) -> float:
+        return leftover(fitter.residuals(runner, group.signal)).excess
+
     def within(runners: Sequence[Valve], most: int) -> int:
         """Return how many are to be followed: none far behind one that explains nearly all."""
         best = runners[0]
-        left = leftover(fitter.residuals(best, group.signal))
-        far_ahead = best.cost < FAR_AHEAD * valve.cost or left.excess <= SPOTLESS
+        far_ahead = best.cost < FAR_AHEAD * valve.cost or excess(best) <= SPOTLESS
         return len(in_reach(valve, runners[:most])) if far_ahead else most
+
+    def won(best: Valve, other: Candidate) -> bool:
+        """Tell whether a candidate that takes long need not run any more."""
+        clear = best.cost < FAR_AHEAD * valve.cost and excess(best) <= SPOTLESS
+        return clear and not odds.look_alike(best.candidates[-1].effect, other.effect)
 
     with ThreadPoolExecutor(os.cpu_count()) as pool:  # compiled runs release the lock
 
@@ -84,9 +93,19 @@ def race(
             most = within(runners, most)
             return sorted([*pool.map(how, runners[:most]), *runners[most:]], key=by_cost)
 
-        runners = sorted(map(count, pool.map(screened, candidates)), key=by_cost)
-        for left, generations in ROUNDS if group.has_stem else ():
-            runners = followed(partial(evolved, generations=generations), runners, left)
+        def heat(ahead: list[Valve], some: Sequence[Candidate]) -> list[Valve]:
+            """Return the runners with some more, which evolve while they are among the best."""
+            fresh = sorted(map(count, pool.map(screened, some)), key=by_cost)
+            for left, generations in ROUNDS if group.has_stem and fresh else ():
+                last = sorted(each.cost for each in (*ahead, *fresh))[:left][-1]
+                among = sum(each.cost <= last for each in fresh)
+                if among:
+                    fresh = followed(partial(evolved, generations=generations), fresh, among)
+            return sorted([*ahead, *fresh], key=by_cost)
+
+        laborious = [each for each in candidates if CATALOGUE[each.effect].laborious]
+        runners = heat([], [each for each in candidates if each not in laborious])
+        runners = heat(runners, [e for e in laborious if not (runners and won(runners[0], e))])
         runners = followed(fitted, runners, FINISHERS)
         return followed(refined, runners, REFINED) if group.has_stem else runners
 

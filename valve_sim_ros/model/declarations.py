@@ -156,6 +156,8 @@ class Effect:
         The same while the stem moves [s].
     order : int
         Place along the signal path among the effects of one slot.
+    laborious : bool
+        A run with it takes many times as long: a search tries others first.
     twins : mapping of str to str
         Effects that look alike, each with what tells them apart.
     variants : tuple of tuple of str
@@ -179,6 +181,7 @@ class Effect:
     longest_step: float = math.inf
     stride: float = math.inf
     order: int = 0
+    laborious: bool = False
     twins: Mapping[str, str] = field(default_factory=dict)
     variants: tuple[tuple[str, ...], ...] = ()
     balance: Callable[..., float] | None = None

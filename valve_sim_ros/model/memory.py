@@ -91,3 +91,25 @@ def mean_of_plays(value: float, width: float, memory: Any) -> float:
         memory[index] = min(max(memory[index], value - half), value + half)
         total += memory[index]
     return total / count
+
+
+@njit
+def bouc_wen(value: float, width: float, reach: float, memory: Any) -> float:
+    """Return a signal that lags behind `value` by up to `width` after a reversal.
+
+    This is the Bouc-Wen model without dynamics, dz = dv / reach (1 - |z|) while |z| grows and
+    dz = dv / reach while it falls, exactly; `memory` holds the last `value` and z.
+    """
+    if math.isnan(memory[0]):
+        memory[0], memory[1] = value, 0.0
+    way = 1.0 if value >= memory[0] else -1.0
+    change = abs(value - memory[0]) / reach
+    along = way * memory[1]
+    if along < 0.0:
+        unloaded = min(change, -along)
+        along += unloaded
+        change -= unloaded
+    if change > 0.0:
+        along = 1.0 - (1.0 - along) * math.exp(-change)
+    memory[0], memory[1] = value, way * along
+    return value - width * memory[1]

@@ -8,12 +8,18 @@ from numba import njit
 
 from ..declarations import Effect, EffectParameter
 
+MIDDLE, LEAST = 60.0, 1.0
+"""p2 at which the rate has its meaning, and below which it does not change any more [%]."""
+
 
 @njit
 def flow(value: Any, state: Any, p: Any, memory: Any, dt: float) -> tuple[float, float]:
-    """Return target and rate of p2' = (p1 - p2) / T_g - k_l p2."""
+    """Return target and rate of p2' = (p1 - p2) / T_g - k_l p2, k_l as it is at this p2."""
     target, rate = value
-    total = rate + p[0]
+    leak_rate, exponent = p
+    if exponent != 1.0:
+        leak_rate *= (max(state.p2, LEAST) / MIDDLE) ** (exponent - 1.0)
+    total = rate + leak_rate
     return target * rate / total, total
 
 
@@ -33,9 +39,22 @@ EFFECT = Effect(
             'Loss of p2 per second and p2',
             starts=(0.003, 0.01, 0.04, 0.15),
         ),
+        EffectParameter(
+            'exponent',
+            'n',
+            '-',
+            1.0,
+            0.3,
+            2.0,
+            'linear',
+            'The loss grows with this power of p2, about 60 %; 0.5 is an orifice, 1 laminar',
+            neutral=1.0,
+            starts=(0.5,),
+        ),
     ),
     slots={'flow_slot': flow},
     order=30,
+    variants=(('leak_rate',), ('leak_rate', 'exponent')),
     explanation='Air escapes from the chamber through the diaphragm, a fitting or a seal.',
     symptom='p2 settles below p1, the more so the higher the pressure; emptying seems faster.',
     confirm='Hold u high for several time constants and compare p2 with p1; spray the fittings.',

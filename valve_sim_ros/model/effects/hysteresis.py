@@ -7,25 +7,37 @@ from typing import Any
 from numba import njit
 
 from ..declarations import Effect, EffectParameter
-from ..memory import mean_of_plays
+from ..memory import bouc_wen, mean_of_plays
 
 PLAYS = 5
 
 
 @njit
+def command(value: float, state: Any, p: Any, memory: Any, dt: float) -> float:
+    """Return the command behind its hysteresis."""
+    return behind(value, p[0], p[3], memory[:PLAYS])
+
+
+@njit
 def inlet(value: float, state: Any, p: Any, memory: Any, dt: float) -> float:
-    """Return the mean of plays of p1."""
-    if p[0] <= 0.0:
-        return value
-    return mean_of_plays(value, p[0], memory[:PLAYS])
+    """Return p1 behind its hysteresis."""
+    return behind(value, p[1], p[3], memory[PLAYS : 2 * PLAYS])
 
 
 @njit
 def sensor(value: float, state: Any, p: Any, memory: Any, dt: float) -> float:
-    """Return the mean of plays of x."""
-    if p[1] <= 0.0:
+    """Return x behind its hysteresis."""
+    return behind(value, p[2], p[3], memory[2 * PLAYS :])
+
+
+@njit
+def behind(value: float, width: float, reach: float, memory: Any) -> float:
+    """Return a signal behind plays, or behind a memory that fills gradually."""
+    if width <= 0.0:
         return value
-    return mean_of_plays(value, p[1], memory[PLAYS:])
+    if reach <= 0.0:
+        return mean_of_plays(value, width, memory)
+    return bouc_wen(value, width, width * max(reach, 1.0), memory)
 
 
 EFFECT = Effect(
@@ -34,6 +46,18 @@ EFFECT = Effect(
     stage='u-p1',
     parameters=(
         EffectParameter(
+            'command_width',
+            'w_u',
+            '%',
+            0.0,
+            0.0,
+            30.0,
+            'linear',
+            'Half-width of the widest play, or of the loop, that u passes through before f_d1',
+            starts=(1.0, 3.0),
+            usual=(0.6, 15.0),
+        ),
+        EffectParameter(
             'inlet_width',
             'w_1',
             '%',
@@ -41,8 +65,8 @@ EFFECT = Effect(
             0.0,
             30.0,
             'linear',
-            'Half-width of the widest play that p1 passes through',
-            usual=(1.0, 15.0),
+            'Half-width of the widest play, or of the loop, that p1 passes through',
+            usual=(0.6, 15.0),
         ),
         EffectParameter(
             'stem_width',
@@ -52,16 +76,34 @@ EFFECT = Effect(
             0.0,
             30.0,
             'linear',
-            'Half-width of the widest play that x passes through',
+            'Half-width of the widest play, or of the loop, that x passes through',
             stage='p2-x',
             starts=(2.0, 6.0),
-            usual=(1.0, 15.0),
+            usual=(0.6, 15.0),
+        ),
+        EffectParameter(
+            'reach',
+            'r',
+            '-',
+            0.0,
+            0.0,
+            10.0,
+            'linear',
+            '0: plays; else Bouc-Wen, which falls behind over 1 or more times the width',
+            starts=(1.2, 2.5),
         ),
     ),
-    slots={'inlet_slot': inlet, 'sensor_slot': sensor},
-    memory=2 * PLAYS,
+    slots={'command_slot': command, 'inlet_slot': inlet, 'sensor_slot': sensor},
+    memory=3 * PLAYS,
     order=20,
-    variants=(('inlet_width',), ('stem_width',)),
+    variants=(
+        ('inlet_width',),
+        # plays may change places with f_d1, Bouc-Wen may not
+        ('inlet_width', 'reach'),
+        ('command_width', 'reach'),
+        ('stem_width',),
+        ('stem_width', 'reach'),
+    ),
     explanation='Many small plays, as in a worn linkage or a flapper, instead of a single one.',
     symptom='Rounded loops, with minor loops inside them, after each reversal.',
     confirm='Run small reversals of growing size slowly.',
@@ -69,5 +111,8 @@ EFFECT = Effect(
         'presliding': 'presliding acts on p2-x only: record p1 and p2',
         'linkage_backlash': 'a single play holds x completely after a reversal: slow reversals',
     },
-    references=('Prandtl-Ishlinskii operator with a uniform density of play widths',),
+    references=(
+        'Prandtl-Ishlinskii operator with a uniform density of play widths',
+        'Ismail, Ikhouane, Rodellar 2009, The hysteresis Bouc-Wen model, a survey',
+    ),
 )

@@ -112,6 +112,7 @@ EFFECT = Effect(
     explanation='The packing gives way elastically before the stem breaks away.',
     symptom='Micro-motion below f_s, minor loops, and no clean stick.',
     confirm='Small reversals below the breakaway force, with a fine position sensor.',
+    laborious=True,
     twins={
         'sensor_quantisation': 'small steps of a coarse sensor hide micro-motion: finer sensor',
         'hysteresis': 'hysteresis of the converter shows in p1 already: record p1',

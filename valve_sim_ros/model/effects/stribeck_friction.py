@@ -136,6 +136,7 @@ EFFECT = Effect(
     explanation='A lubricated packing loses friction only as the stem picks up speed.',
     symptom='Slow motion meets almost static friction; repeated slips whose size varies.',
     confirm='Slow and fast ramps: the offset p2-x while moving depends on the speed.',
+    laborious=True,
     twins={
         'presliding': 'presliding shows as motion below f_s: small reversals',
         'dwell_friction': 'that one depends on the time at rest: steps after short and long rests',

@@ -67,5 +67,6 @@ EFFECT = Effect(
     explanation='A pump, cavitation or pulsating flow shakes the stem.',
     symptom='Periodic slips and a line in the spectrum of x.',
     confirm='Record x at a higher rate while u rests.',
+    laborious=True,
     twins={'sensor_drift': 'a very slow vibration is a drift: record for longer'},
 )
