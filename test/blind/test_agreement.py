@@ -58,7 +58,7 @@ SAME = {
     'stribeck_friction': ({'stribeck': 15.0}, {'velocity': 15.0}),
     'presliding': (
         {'bristle': 4.0, 'bristle_stribeck': 1.0},
-        {'compliance': 0.25},
+        {'compliance': 0.25, 'drop_speed': 1.0},
     ),
     'dwell_friction': (
         {'dwell_gain': 0.8, 'dwell_time': 10.0},
@@ -82,6 +82,11 @@ SAME = {
 }
 
 OTHER_FORMS = [
+    (
+        'presliding',
+        {'bristle': 4.0, 'bristle_stribeck': 0.03},
+        {'compliance': 0.25, 'drop_speed': 0.03},
+    ),
     (
         'nonlinear_flow',
         {'flow_critical': 0.3, 'flow_absolute': 60.0},

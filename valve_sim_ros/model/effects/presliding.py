@@ -11,29 +11,28 @@ from ..declarations import Effect, EffectParameter
 from ..state import Motion, moved
 from ..stem import Friction, Stem
 
-DROP = 1.0
-"""Speed at which bristle friction has fallen from f_s to f_d [%/s]."""
 STIFFEST = 200.0
 """Bristles are not stiffer than this, relative to the spring: their travel is then not seen."""
-HEAVIEST, FASTEST = 4000.0, 500.0
+HEAVIEST, FASTEST = 2000.0, 150.0
 """Bounds of k/m [1/s^2] and F_v/m [1/s]: beyond them only their ratio is visible in a record."""
 STEP, STABLE = 0.008, 2.0
 """Longest step [s], and longest step times the fastest rate."""
 SLOW, FAST = 1e-3, 6.0
-"""Speeds below which all of f_s - f_d is left, and beyond which nothing [DROP]."""
+"""Speeds below which all of f_s - f_d is left, and beyond which nothing [v_s]."""
 
 
 class Bristles(NamedTuple):
     """Constants of the stem on its bristles.
 
-    k/m [1/s^2], F_v/m [1/s], stiffness and damping [s] of the bristles relative to the spring, and
-    friction.
+    k/m [1/s^2], F_v/m [1/s], stiffness and damping [s] of the bristles relative to the spring, v_s
+    [%/s], and friction.
     """
 
     inertia: float
     damping: float
     stiffness: float
     bristle_damping: float
+    drop_speed: float
     friction: Friction
 
 
@@ -47,7 +46,7 @@ def motion(value: Any, state: Any, p: Any, memory: Any, dt: float) -> Motion:
     inertia = min(theta.a_1, HEAVIEST, FASTEST * theta.a_1 / theta.a_2)
     damping = inertia * theta.a_2 / theta.a_1
     omega = math.sqrt(inertia * stiffness)
-    b = Bristles(inertia, damping, stiffness, 2.0 * stiffness / omega, friction)
+    b = Bristles(inertia, damping, stiffness, 2.0 * stiffness / omega, p[1], friction)
     x, v, z = state.x, state.v, memory[0]
     if math.isnan(z):
         force = value.target + value.excess - friction.stiffness * x
@@ -79,7 +78,7 @@ def rates(p2: float, x: float, v: float, z: float, b: Bristles) -> tuple[float, 
     """Return the rates of the stem's speed [%/s^2] and of the bristles [%/s]."""
     f = b.friction
     static, dynamic = (f.static_up, f.dynamic_up) if v >= 0.0 else (f.static_down, f.dynamic_down)
-    ratio = v / DROP
+    ratio = v / b.drop_speed
     level = dynamic + 1e-6
     if abs(ratio) < FAST:
         fall = math.exp(-ratio * ratio) if abs(ratio) > SLOW else 1.0
@@ -104,6 +103,18 @@ EFFECT = Effect(
             'linear',
             'Elastic travel of the stuck stem per force, relative to that of the spring',
             starts=(0.1, 0.35),
+        ),
+        EffectParameter(
+            'drop_speed',
+            'v_s',
+            '%/s',
+            0.1,
+            0.005,
+            20.0,
+            'log',
+            'Speed at which friction has fallen from f_s to f_d',
+            neutral=0.1,
+            starts=(0.1,),
         ),
     ),
     slots={'motion_slot': motion},
