@@ -219,6 +219,11 @@ def test_a_misfit_in_a_tenth_of_the_time_is_an_excess():
     assert left.excess == pytest.approx(1.6, abs=0.4)
 
 
+def test_a_model_that_swings_everywhere_does_not_pass_for_noise():
+    swings = 30.0 * np.random.default_rng(5).standard_normal(4000)
+    assert leftover(swings).excess > 1.0
+
+
 def test_errors_of_any_size_can_be_compared():
     rng = np.random.default_rng(2)
     noise, misfit = rng.standard_normal(5000), np.linspace(-400.0, 400.0, 5000)

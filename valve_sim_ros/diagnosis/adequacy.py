@@ -17,6 +17,8 @@ FAR = 4.5
 """Errors beyond this are hardly ever noise [noise]."""
 QUIET = 0.3
 """The quietest share of the windows shows the noise."""
+LOWEST, HIGHEST = 0.3, 8.0
+"""What may be noise [that seen from sample to sample]: a swinging model leaves no quiet window."""
 
 
 class Leftover(NamedTuple):
@@ -61,7 +63,7 @@ def leftover(residual: Array) -> Leftover:
     inflation = _inflation(quiet)
     sizes = np.abs(values)
     cut = np.minimum(sizes, LARGE)
-    floor = max(floor * inflation**0.5, 0.3)
+    floor = min(max(floor * inflation**0.5, LOWEST), HIGHEST)
     return Leftover(
         float(np.mean(cut * (2.0 * sizes - cut))),
         float(np.mean(cut**2)),

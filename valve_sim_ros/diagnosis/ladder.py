@@ -128,7 +128,7 @@ def climb(
         return replace(there, cost=cost), leftover(fitter.residuals(there, group.signal))
 
     def worth(left: Leftover) -> bool:
-        if left.excess <= carried:
+        if 0.0 < left.excess <= carried:
             return False
         if rungs:
             return left.excess > odds.CLEAN
