@@ -7,6 +7,7 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Literal
 
+from ..model.effects import CATALOGUE
 from . import odds
 from .adequacy import Leftover, leftover
 from .base_valve import find_base
@@ -181,11 +182,16 @@ def deepened(
     runners: list[Valve],
     progress: Callable[[float], object],
 ) -> list[Valve]:
-    """Search for the base valve anew beside the best effects, if none explains the signal."""
+    """Search for the base valve anew beside the best effects, if none explains the signal.
+
+    Not beside those whose runs take long: it would take minutes.
+    """
     if leftover(fitter.residuals(runners[0], group.signal)).excess <= odds.CLEAN:
         return runners
     found = []
     for each in in_reach(valve, odds.best_per_effect(runners)[:DEEPENED]):
+        if CATALOGUE[each.candidates[-1].effect].laborious:
+            continue
         progress(1.0)
         there = find_base(fitter, group, each, fitter.drive)
         found.append(fitter.refined(there, fitter.problem(group, there)))

@@ -15,6 +15,8 @@ from numba import njit
 
 OVERDAMPED, CRITICAL, UNDERDAMPED = 0, 1, 2
 MAX_EVENTS = 200
+HEAVIEST, FASTEST = 2000.0, 150.0
+"""Bounds of k/m [1/s^2] and F_v/m [1/s] where the stem is integrated in short steps."""
 
 
 class Poles(NamedTuple):
@@ -77,6 +79,13 @@ def stem_poles(a_1: float, a_2: float) -> Poles:
         return Poles(OVERDAMPED, first, second, 1.0 / (first - second))
     omega = math.sqrt(-discriminant)
     return Poles(UNDERDAMPED, -half, omega, 1.0 / omega)
+
+
+@njit
+def visible(a_1: float, a_2: float) -> tuple[float, float]:
+    """Return k/m [1/s^2] and F_v/m [1/s], bounded: beyond, a record shows their ratio only."""
+    bounded = min(a_1, HEAVIEST, FASTEST * a_1 / a_2)
+    return bounded, bounded * a_2 / a_1
 
 
 @njit

@@ -9,12 +9,10 @@ from numba import njit
 
 from ..declarations import Effect, EffectParameter
 from ..state import Motion, moved
-from ..stem import Friction, Stem
+from ..stem import Friction, Stem, visible
 
 STIFFEST = 200.0
 """Bristles are not stiffer than this, relative to the spring: their travel is then not seen."""
-HEAVIEST, FASTEST = 2000.0, 150.0
-"""Bounds of k/m [1/s^2] and F_v/m [1/s]: beyond them only their ratio is visible in a record."""
 STEP, STABLE = 0.008, 2.0
 """Longest step [s], and longest step times the fastest rate."""
 SLOW, FAST = 1e-3, 6.0
@@ -43,8 +41,7 @@ def motion(value: Any, state: Any, p: Any, memory: Any, dt: float) -> Motion:
         return value
     friction, theta = value.friction, value.theta
     stiffness = min(1.0 / p[0], STIFFEST)
-    inertia = min(theta.a_1, HEAVIEST, FASTEST * theta.a_1 / theta.a_2)
-    damping = inertia * theta.a_2 / theta.a_1
+    inertia, damping = visible(theta.a_1, theta.a_2)
     omega = math.sqrt(inertia * stiffness)
     b = Bristles(inertia, damping, stiffness, 2.0 * stiffness / omega, p[1], friction)
     x, v, z = state.x, state.v, memory[0]

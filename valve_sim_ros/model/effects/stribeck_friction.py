@@ -8,8 +8,8 @@ from typing import Any, NamedTuple
 from numba import njit
 
 from ..declarations import Effect, EffectParameter
-from ..state import Motion, moved, Theta
-from ..stem import Friction, Stem
+from ..state import Motion, moved
+from ..stem import Friction, Stem, visible
 
 STEP, STABLE = 0.002, 0.4
 """Longest step [s], and longest step times the fastest rate of the stem."""
@@ -42,12 +42,13 @@ def motion(value: Any, state: Any, p: Any, memory: Any, dt: float) -> Motion:
     if p[0] <= 0.0 or dt == 0.0 or not moves:
         return value
     f, theta = value.friction, value.theta
-    fastest = max(theta.a_2, math.sqrt(theta.a_1 * f.stiffness))
+    a_1, a_2 = visible(theta.a_1, theta.a_2)
+    fastest = max(a_2, math.sqrt(a_1 * f.stiffness))
     left = math.ceil(dt / min(STEP, STABLE / fastest))
     short = dt / left
     decay = math.exp(-value.rate * short)
     stem = Stem(state.x, state.v, state.direction, state.armed != 0.0)
-    slip = slipping(stem.direction, f, theta, p[0])
+    slip = slipping(stem.direction, f, a_1, a_2, p[0])
     end = value.target + value.excess
     calm = False
     while left > 0:
@@ -65,7 +66,7 @@ def motion(value: Any, state: Any, p: Any, memory: Any, dt: float) -> Motion:
                 h *= (end - level) / (end - begin)
                 begin = level
             stem = Stem(stem.x, 0.0, 1.0 if end > up else -1.0, False)
-            slip = slipping(stem.direction, f, theta, p[0])
+            slip = slipping(stem.direction, f, a_1, a_2, p[0])
         speed = stem.v
         stem = slipped(stem, begin, end, h, slip, theta.delta)
         calm = abs(stem.v - speed) < STEADY * count * abs(speed)
@@ -73,12 +74,12 @@ def motion(value: Any, state: Any, p: Any, memory: Any, dt: float) -> Motion:
 
 
 @njit
-def slipping(direction: float, f: Friction, theta: Theta, fall: float) -> Slipping:
+def slipping(direction: float, f: Friction, a_1: float, a_2: float, fall: float) -> Slipping:
     """Return the constants of a slip."""
     level, rise = f.dynamic_up, f.static_up - f.dynamic_up
     if direction < 0.0:
         level, rise = f.dynamic_down, f.static_down - f.dynamic_down
-    return Slipping(direction, theta.a_1, theta.a_2, f.stiffness, level, rise, fall)
+    return Slipping(direction, a_1, a_2, f.stiffness, level, rise, fall)
 
 
 @njit
