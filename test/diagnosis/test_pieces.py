@@ -95,7 +95,7 @@ def test_where_pressure_creeps_the_moment_of_a_slip_is_forgiven():
         'x_0': 20.0,
     }
     time = 0.2 * np.arange(u.size)
-    (truth,) = Bench([Recording(time, u, x=u)]).run(complete(slow))
+    (truth,) = Bench([Recording(time, u, p1=u)]).run(complete(slow))
     noise = 0.2 * np.random.default_rng(4).standard_normal(u.size)
     bench = Bench([Recording(time, u, truth[0], truth[1], truth[2] + noise)])
     own, little, much = (
@@ -142,6 +142,12 @@ def test_a_stem_is_put_to_rest_only_where_it_is_far_from_it():
     right, stiff = complete({**VALUES, **start}), complete({**VALUES, **start, 'f_s': 9.0})
     assert bench.score(right, (), 'x', (CAUGHT,)) == bench.score(right, (), 'x')
     assert bench.score(stiff, (), 'x', (CAUGHT,)) < 0.8 * bench.score(stiff, (), 'x')
+
+
+def test_a_stem_is_where_it_was_seen_until_it_travels():
+    bench = Bench([recording(noise=0.2)])
+    (result,) = bench.run(complete({**VALUES, 'p1_0': 0.0, 'p2_0': 0.0, 'x_0': 2.0}))
+    assert result[2, 15] == pytest.approx(0.0, abs=0.3)
 
 
 def test_a_loop_is_seen_through_a_stem_held_where_it_was_measured():

@@ -69,12 +69,14 @@ class Bench:
             for name, values in stretch.measured.items():
                 values[wild(values, OUTLIER * self.noise[name])] = np.nan
             stretch.noise = {n: self._uncertainty(n, v) for n, v in stretch.measured.items()}
-            settled = np.arange(stretch.u.size) >= self._settled(stretch)
+            samples, travelled = np.arange(stretch.u.size), self._travelled(stretch)
+            settled = samples >= min(travelled, int(MOST_UNSETTLED * samples.size))
             stretch.recount({n: np.where(settled, v, np.nan) for n, v in stretch.measured.items()})
             if 'x' in self.signals:
                 whole = filled(stretch.measured['x'])
                 stretch.held = smooth(whole, self.noise['x'])
                 stretch.rests = np.where(still(whole, self.noise['x']), stretch.held, np.nan)
+                stretch.begins = np.where(samples < travelled, stretch.rests, np.nan)
         self.size = sum(stretch.u.size for stretch in self.stretches)
 
     def run(
@@ -254,7 +256,7 @@ class Bench:
         """Return how far p1 moves up to each sample of a result [%], shape (n,)."""
         return np.abs(np.diff(result[0], prepend=result[0, :1]))
 
-    def _settled(self, stretch: Stretch) -> int:
+    def _travelled(self, stretch: Stretch) -> int:
         """Return the first sample by which the unknown state before the record is forgotten.
 
         Plays and friction forget it as the valve travels: the last signal is watched.
@@ -266,8 +268,7 @@ class Bench:
         moved = np.abs(values[known] - values[known[0]]) > max(
             TRAVEL, OUTLIER * self.noise[self.signals[-1]]
         )
-        first = int(known[np.argmax(moved)]) + 10 if moved.any() else 0
-        return min(first, int(MOST_UNSETTLED * values.size))
+        return int(known[np.argmax(moved)]) + 10 if moved.any() else 0
 
     @property
     def range_of_u(self) -> tuple[float, float]:

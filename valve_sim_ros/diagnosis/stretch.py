@@ -43,7 +43,8 @@ class Stretch:
     """A run of samples without a gap, shape (n,) each; outputs are NaN where lost.
 
     `counts` are the measured outputs where they count, `noise` their uncertainty, `rests` x
-    where it rests, `held` x smoothed between its slips.
+    where it rests, `begins` the same until the stem has travelled: there it is always put, since
+    nobody knows what held it before. `held` is x smoothed between its slips.
     """
 
     time: Array
@@ -52,6 +53,7 @@ class Stretch:
     counts: dict[str, Array] = field(default_factory=dict)
     noise: dict[str, Array] = field(default_factory=dict)
     rests: Array = field(default_factory=lambda: np.empty(0))
+    begins: Array = field(default_factory=lambda: np.empty(0))
     held: Array = field(default_factory=lambda: np.empty(0))
     _grids: dict[Any, Grid] = field(default_factory=dict)
 
@@ -105,6 +107,8 @@ class Stretch:
         rows[order] = np.arange(time.size)
         rows = rows[:n]
         forced, nothing = np.full((3, time.size), np.nan), np.full(time.size, np.nan)
+        if self.begins.size:
+            forced[STEM, rows] = self.begins
         for name in drive:
             if name == HELD:
                 # what a loop sees at the end of a step
