@@ -85,6 +85,14 @@ def race(
         clear = best.cost < FAR_AHEAD * valve.cost and excess(best) <= SPOTLESS
         return clear and not odds.look_alike(best.candidates[-1].effect, other.effect)
 
+    def beside(best: Valve, runner: Valve) -> Valve:
+        """Return one that looks like the best, refitted from the best's base valve as well."""
+        effect, other = best.candidates[-1].effect, runner.candidates[-1].effect
+        if effect == other or not odds.look_alike(effect, other):
+            return runner
+        base = {unknown.name: best.values[unknown.name] for unknown in fitter.unknowns(group)}
+        return min(runner, fitted(replace(runner, values={**runner.values, **base})), key=by_cost)
+
     with ThreadPoolExecutor(os.cpu_count()) as pool:  # compiled runs release the lock
 
         def followed(how: Callable[..., Valve], runners: list[Valve], most: int) -> list[Valve]:
@@ -107,7 +115,10 @@ def race(
         runners = heat([], [each for each in candidates if each not in laborious])
         runners = heat(runners, [e for e in laborious if not (runners and won(runners[0], e))])
         runners = followed(fitted, runners, FINISHERS)
-        return followed(refined, runners, REFINED) if group.has_stem else runners
+        if not group.has_stem:
+            return runners
+        runners = followed(refined, runners, REFINED)
+        return sorted(pool.map(partial(beside, runners[0]), runners), key=by_cost)
 
 
 def in_reach(valve: Valve, runners: Sequence[Valve]) -> list[Valve]:
