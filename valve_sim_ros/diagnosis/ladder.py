@@ -241,6 +241,9 @@ def judged(
     fitter: Fitter, group: Group, now: Valve, before: Leftover, runners: Sequence[Valve]
 ) -> Rung | None:
     """Return the step to the best runner if the evidence is enough."""
+    runners = [runner for runner in runners if odds.size(runner) > odds.NEGLIGIBLE]
+    if not runners:
+        return None
     best_after = leftover(fitter.residuals(runners[0], group.signal))
     inflation, count = best_after.inflation, best_after.samples
     tops = odds.best_per_effect(runners)

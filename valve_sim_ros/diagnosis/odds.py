@@ -17,6 +17,8 @@ MORE_ENOUGH, MORE_EXCESS, MORE_CLOSED = 60.0, 0.25, 0.6
 MORE_SHARE, FAR_OFF = 0.02, 2.0
 """Least part of the whole gap that it closes; the excess from which it may close less of what is
 left, if both together explain the gap."""
+NEGLIGIBLE = 1.0 / 3.0
+"""An effect of less than this part of its least usual size is another run of the base valve."""
 LASTING = (
     'ip_calibration',
     'ip_nonlinearity',
@@ -84,16 +86,24 @@ def twin_limit(gained: float, share: float = TWIN_SHARE) -> float:
 def surprise(valve: Valve) -> int:
     """Return how odd a fitted effect is: parameters of wrong sign, too large, or all too small."""
     candidate = valve.candidates[-1]
-    odd, sizes = 0, []
+    odd = 0
     for name in candidate.names:
         parameter = declared(candidate.effect, name)
         change = valve.values[f'{candidate.effect}.{name}'] - parameter.neutral
         odd += parameter.positive and change < 0.0
+        odd += bool(parameter.usual) and abs(change) > parameter.usual[1]
+    return odd + (size(valve) < 1.0)
+
+
+def size(valve: Valve) -> float:
+    """Return how large a fitted effect is, 1 being the least that is usual; 1 if none is told."""
+    effect, sizes = valve.candidates[-1].effect, []
+    for name in valve.candidates[-1].names:
+        parameter = declared(effect, name)
         if parameter.usual:
-            least, most = parameter.usual
-            odd += abs(change) > most
-            sizes.append(abs(change) / least)
-    return odd + (max(sizes, default=1.0) < 1.0)
+            change = valve.values[f'{effect}.{name}'] - parameter.neutral
+            sizes.append(abs(change) / parameter.usual[0])
+    return max(sizes, default=1.0)
 
 
 def further(gained: float, before: Leftover) -> bool:

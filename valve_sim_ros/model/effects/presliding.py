@@ -100,6 +100,7 @@ EFFECT = Effect(
             'linear',
             'Elastic travel of the stuck stem per force, relative to that of the spring',
             starts=(0.1, 0.35),
+            usual=(0.05, 1.2),
         ),
         EffectParameter(
             'drop_speed',
