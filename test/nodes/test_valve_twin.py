@@ -4,7 +4,6 @@
 
 import json
 import threading
-from types import ModuleType
 
 from conftest import overrides
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
@@ -172,7 +171,7 @@ class Diagnosis:
 
 @pytest.mark.ros
 def test_diagnose_stops_nothing(bench, pair, monkeypatch):
-    module, go, asked = ModuleType('diagnosis'), threading.Event(), []
+    go, asked = threading.Event(), []
 
     def diagnose(recording, *, spec, progress):
         progress(0.1, 'waiting')
@@ -180,8 +179,7 @@ def test_diagnose_stops_nothing(bench, pair, monkeypatch):
         assert go.wait(20.0)
         return Diagnosis(recording, spec)
 
-    module.diagnose = diagnose
-    monkeypatch.setitem(__import__('sys').modules, 'valve_sim_ros.diagnosis', module)
+    monkeypatch.setattr('valve_sim_ros.diagnosis.diagnose', diagnose)
     _, peer, twin = pair(VALVE, VALVE)
     refused = bench.call(Trigger, '/valve_twin/diagnose')
     assert not refused.success
