@@ -17,7 +17,7 @@ from valve_sim_ros.diagnosis.conditions import places
 from valve_sim_ros.diagnosis.decision import TestSignal
 from valve_sim_ros.diagnosis.descent import cost_of, descend, walk
 from valve_sim_ros.diagnosis.evolution import evolve
-from valve_sim_ros.diagnosis.fitting import Fitter
+from valve_sim_ros.diagnosis.fitting import Fitter, Valve
 from valve_sim_ros.diagnosis.proof import closed
 from valve_sim_ros.diagnosis.stages import groups
 from valve_sim_ros.diagnosis.stretch import CAUGHT, HELD
@@ -228,6 +228,20 @@ def test_a_misfit_in_a_tenth_of_the_time_is_an_excess():
 def test_a_model_that_swings_everywhere_does_not_pass_for_noise():
     swings = 30.0 * np.random.default_rng(5).standard_normal(4000)
     assert leftover(swings).excess > 1.0
+
+
+def test_an_effect_is_as_large_as_its_largest_parameter_is_for_one():
+    group = groups(('p1', 'p2', 'x'))[0]
+    (candidate,) = [c for c in group.candidates() if c.effect == 'ip_calibration']
+
+    def fitted(zero, span):
+        values = {**candidate.neutral, 'ip_calibration.zero': zero, 'ip_calibration.span': span}
+        return Valve(values, candidates=(candidate,))
+
+    assert odds.size(fitted(0.05, 1.0005)) < odds.NEGLIGIBLE
+    assert odds.surprise(fitted(0.05, 1.0005)) == 1
+    assert odds.surprise(fitted(-1.0, 1.0)) == 0  # a zero error alone is nothing odd
+    assert odds.surprise(fitted(9.0, 1.0)) == 1
 
 
 def test_errors_of_any_size_can_be_compared():

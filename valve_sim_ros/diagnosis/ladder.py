@@ -129,7 +129,7 @@ def climb(
         return replace(there, cost=cost), leftover(fitter.residuals(there, group.signal))
 
     def worth(left: Leftover) -> bool:
-        if 0.0 < left.excess <= carried:
+        if carried and left.excess <= carried:
             return False
         if rungs:
             return left.excess > odds.CLEAN

@@ -80,11 +80,6 @@ def race(
         far_ahead = best.cost < FAR_AHEAD * valve.cost or excess(best) <= SPOTLESS
         return len(in_reach(valve, runners[:most])) if far_ahead else most
 
-    def won(best: Valve, other: Candidate) -> bool:
-        """Tell whether a candidate that takes long need not run any more."""
-        clear = best.cost < FAR_AHEAD * valve.cost and excess(best) <= SPOTLESS
-        return clear and not odds.look_alike(best.candidates[-1].effect, other.effect)
-
     def beside(best: Valve, runner: Valve) -> Valve:
         """Return one that looks like the best, refitted from the best's base valve as well."""
         effect, other = best.candidates[-1].effect, runner.candidates[-1].effect
@@ -113,7 +108,11 @@ def race(
 
         laborious = [each for each in candidates if CATALOGUE[each.effect].laborious]
         runners = heat([], [each for each in candidates if each not in laborious])
-        runners = heat(runners, [e for e in laborious if not (runners and won(runners[0], e))])
+        best = runners[0] if runners else valve
+        if best.cost < FAR_AHEAD * valve.cost and excess(best) <= SPOTLESS:
+            effect = best.candidates[-1].effect
+            laborious = [each for each in laborious if odds.look_alike(effect, each.effect)]
+        runners = heat(runners, laborious)
         runners = followed(fitted, runners, FINISHERS)
         if not group.has_stem:
             return runners
