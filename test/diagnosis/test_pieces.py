@@ -106,6 +106,15 @@ def test_where_pressure_creeps_the_moment_of_a_slip_is_forgiven():
     assert np.nanmax(np.abs(much)) > 10.0
 
 
+@pytest.mark.parametrize('drive', [(), ('p1', 'p2')])
+def test_a_stem_that_is_nearly_free_is_forgiven_nothing(drive):
+    bench = Bench([recording(0.1)])
+    free = {**VALUES, 'T_g1': 0.02, 'T_g2': 0.02, 'f_s': 0.01, 'p1_0': 0.5, 'p2_0': 0.5, 'x_0': 0.5}
+    results = bench.run(complete(free), (), drive)
+    assert np.mean(results[0][3]) < 0.02
+    assert np.mean(np.abs(bench.residual(results, 'x')) > 5.0) > 0.3
+
+
 def test_a_coarse_sensor_shows_its_step():
     record = recording(noise=0.2)
 

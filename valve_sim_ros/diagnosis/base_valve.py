@@ -19,6 +19,8 @@ FEW_STARTS = 3
 """So many starts are followed."""
 FOLLOWED, GENERATIONS = 4, 30
 """So many base valves are followed by an evolution where costs are rugged, and for how long."""
+NEARLY = 0.95
+"""Phase beyond which a command acts nearly a whole period late or early."""
 
 
 def starting_valve(bench: Bench) -> Valve:
@@ -48,17 +50,25 @@ def find_base(
     starts = [{**valve.values, **stem, **there} for stem in stems for there in points]
     starts.append(dict(valve.values))
     apart, most = [starts], FEW_STARTS
-    if group.stages == ('p2-x',):
-        seen = fitter.bench.friction_seen(fitter.results(valve))
-        starts += [{**valve.values, **there} for there in friction_grid(seen)]
-        # of each share of friction one, or all end in the same valley
-        shares = dict.fromkeys(start['f_d/f_s'] for start in starts)
-        apart = [[start for start in starts if start['f_d/f_s'] == share] for share in shares]
+    if group.has_stem:
+        # of each (share of) friction one, or all end in the same valley
+        name = 'f_s'
+        if group.stages == ('p2-x',):
+            name = 'f_d/f_s'
+            seen = fitter.bench.friction_seen(fitter.results(valve))
+            starts += [{**valve.values, **there} for there in friction_grid(seen)]
+        levels = dict.fromkeys(start[name] for start in starts)
+        apart = [[start for start in starts if start[name] == level] for level in levels]
         most = 1
 
     def followed(way: Problem) -> list[Valve]:
         tried = [each for some in apart for each in fitter.scan(valve, some, way, most)]
-        return sorted((fitter.fit(each, way, SHORT) for each in tried), key=by_cost)
+        each = [fitter.fit(one, way, SHORT) for one in tried]
+        if fitter.phase in way[0]:  # one that ran to the end of its range seldom comes back
+            far = [one for one in each if abs(one.values['phase']) > NEARLY]
+            back = [replace(one, values={**one.values, 'phase': 0.0}) for one in far]
+            each += [fitter.fit(one, way, SHORT) for one in back]
+        return sorted(each, key=by_cost)
 
     found = followed(problem)
     if roughly:

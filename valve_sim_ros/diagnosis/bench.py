@@ -29,10 +29,12 @@ MIXED, LEAST_MIXED, MIXED_JITTER = 0.02, 3, 0.7
 """Else this share and number of samples does; and the uncertainty of the time of a sample then."""
 LEAST_AT_REST = 0.3
 """Share of the samples of p1 that counts even so."""
-TRAVEL, MOST_UNSETTLED = 8.0, 0.1
-"""A record counts once the valve has travelled this far [%], or after this share."""
-SLACK = 0.03
-"""By so much p2 may be off where the stem begins to slip [% of span]."""
+TRAVEL, MOST_UNSETTLED, DEPARTED = 8.0, 0.1, 4.0
+"""A record counts once the valve has travelled this far [%], or after this share; the stem has left
+where it began after less."""
+SLACK, SLACK_SHARE = 0.03, 0.01
+"""By so much p2 may be off where the stem begins to slip [% of span], but by no more than this part
+of the friction: a stem that is nearly free always begins to slip."""
 APART = 6.0
 """A stem is caught where it is further than this from where it should rest [noise]."""
 LEAST_RESTS = 20
@@ -69,14 +71,17 @@ class Bench:
             for name, values in stretch.measured.items():
                 values[wild(values, OUTLIER * self.noise[name])] = np.nan
             stretch.noise = {n: self._uncertainty(n, v) for n, v in stretch.measured.items()}
-            samples, travelled = np.arange(stretch.u.size), self._travelled(stretch)
+            samples = np.arange(stretch.u.size)
+            travelled = self._travelled(stretch, TRAVEL) + 10
             settled = samples >= min(travelled, int(MOST_UNSETTLED * samples.size))
             stretch.recount({n: np.where(settled, v, np.nan) for n, v in stretch.measured.items()})
             if 'x' in self.signals:
                 whole = filled(stretch.measured['x'])
                 stretch.held = smooth(whole, self.noise['x'])
                 stretch.rests = np.where(still(whole, self.noise['x']), stretch.held, np.nan)
-                stretch.begins = np.where(samples < travelled, stretch.rests, np.nan)
+                # not to the end of its travel: one that creeps there seems to rest
+                departed = self._travelled(stretch, DEPARTED)
+                stretch.begins = np.where(samples < departed, stretch.rests, np.nan)
         self.size = sum(stretch.u.size for stretch in self.stretches)
 
     def run(
@@ -150,7 +155,7 @@ class Bench:
             OUTPUTS.index(signal),
             grid.targets.get(signal, grid.nothing),
             grid.scales.get(signal, grid.nothing),
-            SLACK,
+            min(SLACK, SLACK_SHARE * values['f_s']),
             APART * self.noise['x'] if CAUGHT in drive and RESTS not in drive else 0.0,
             bound,
         )
@@ -256,19 +261,19 @@ class Bench:
         """Return how far p1 moves up to each sample of a result [%], shape (n,)."""
         return np.abs(np.diff(result[0], prepend=result[0, :1]))
 
-    def _travelled(self, stretch: Stretch) -> int:
-        """Return the first sample by which the unknown state before the record is forgotten.
+    def _travelled(self, stretch: Stretch, far: float) -> int:
+        """Return the first sample by which the valve has travelled `far`, 0 if it never does.
 
-        Plays and friction forget it as the valve travels: the last signal is watched.
+        Plays and friction forget the unknown state before the record as it travels: the last
+        signal is watched.
         """
         values = stretch.measured[self.signals[-1]]
         known = np.flatnonzero(np.isfinite(values))
         if not known.size:
             return 0
-        moved = np.abs(values[known] - values[known[0]]) > max(
-            TRAVEL, OUTLIER * self.noise[self.signals[-1]]
-        )
-        return int(known[np.argmax(moved)]) + 10 if moved.any() else 0
+        far = max(far, OUTLIER * self.noise[self.signals[-1]])
+        moved = np.abs(values[known] - values[known[0]]) > far
+        return int(known[np.argmax(moved)]) if moved.any() else 0
 
     @property
     def range_of_u(self) -> tuple[float, float]:

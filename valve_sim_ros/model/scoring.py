@@ -64,8 +64,9 @@ def run_scored(
     scale : ndarray, shape (n,)
         One over its noise [1/%].
     slack : float
-        As long as p2 is this close to where the stem begins to slip, the moment of the slip is in
-        doubt; errors of x beyond DOUBTFUL do not count then [% of span].
+        As long as p2 creeps, less than this in a sample, and is this close to where the stem begins
+        to slip, the moment of the slip is in doubt; errors of x beyond DOUBTFUL do not count then
+        [% of span].
     apart : float
         A stem no further than this from where it should rest goes on by itself [% of span].
     bound : float
@@ -101,9 +102,11 @@ def run_scored(
                 relief -= max(added - DOUBTFUL, 0.0)
             first += 1
         if moving and not moved:
-            doubtful, slip = True, now.p2
-            outputs[3, first:k] = 1.0
-            score -= relief
+            slip = now.p2
+            doubtful = k > 0 and abs(slip - outputs[1, k - 1]) < slack
+            if doubtful:
+                outputs[3, first:k] = 1.0
+                score -= relief
         doubtful = doubtful and abs(now.p2 - slip) < slack
         outputs[3, k] = 1.0 if doubtful else 0.0
         added = penalty(outputs[signal, k], target[k], scale[k])
