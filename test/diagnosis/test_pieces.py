@@ -159,6 +159,18 @@ def test_a_stem_is_where_it_was_seen_until_it_travels():
     assert result[2, 15] == pytest.approx(0.0, abs=0.3)
 
 
+@pytest.mark.parametrize('noise', [0.1, 0.3])
+def test_a_stem_that_creeps_at_first_is_not_held_where_it_seems_to_rest(noise):
+    u = np.concatenate([np.full(n, v) for n, v in ((50, 70.0), (150, 20.0), (700, 90.0))])
+    slow = {**VALUES, 'T_g1': 12.0, 'T_g2': 60.0, 'f_s': 10.0}
+    slow |= {'p1_0': 70.0, 'p2_0': 70.0, 'x_0': 70.0}
+    time = 0.2 * np.arange(u.size)
+    (truth,) = Bench([Recording(time, u, p1=u)]).run(complete(slow))
+    x = truth[2] + noise * np.random.default_rng(4).standard_normal(u.size)
+    bench = Bench([Recording(time, u, truth[0], truth[1], x)])
+    assert np.nanmax(np.abs(bench.residual(bench.run(complete(slow)), 'x'))) < 6.0
+
+
 def test_a_loop_is_seen_through_a_stem_held_where_it_was_measured():
     loop = {
         'positioner_loop.gain': 1.5,

@@ -29,9 +29,8 @@ MIXED, LEAST_MIXED, MIXED_JITTER = 0.02, 3, 0.7
 """Else this share and number of samples does; and the uncertainty of the time of a sample then."""
 LEAST_AT_REST = 0.3
 """Share of the samples of p1 that counts even so."""
-TRAVEL, MOST_UNSETTLED, DEPARTED = 8.0, 0.1, 4.0
-"""A record counts once the valve has travelled this far [%], or after this share; the stem has left
-where it began after less."""
+TRAVEL, MOST_UNSETTLED = 8.0, 0.1
+"""A record counts once the valve has travelled this far [%], or after this share."""
 SLACK, SLACK_SHARE = 0.03, 0.01
 """By so much p2 may be off where the stem begins to slip [% of span], but by no more than this part
 of the friction: a stem that is nearly free always begins to slip."""
@@ -79,8 +78,8 @@ class Bench:
                 whole = filled(stretch.measured['x'])
                 stretch.held = smooth(whole, self.noise['x'])
                 stretch.rests = np.where(still(whole, self.noise['x']), stretch.held, np.nan)
-                # not to the end of its travel: one that creeps there seems to rest
-                departed = self._travelled(stretch, DEPARTED)
+                # no longer: one that creeps on seems to rest
+                departed = self._travelled(stretch, 0.0)
                 stretch.begins = np.where(samples < departed, stretch.rests, np.nan)
         self.size = sum(stretch.u.size for stretch in self.stretches)
 
@@ -262,7 +261,7 @@ class Bench:
         return np.abs(np.diff(result[0], prepend=result[0, :1]))
 
     def _travelled(self, stretch: Stretch, far: float) -> int:
-        """Return the first sample by which the valve has travelled `far`, 0 if it never does.
+        """Return the first sample by which the valve is `far` away, beyond any noise; 0 if never.
 
         Plays and friction forget the unknown state before the record as it travels: the last
         signal is watched.

@@ -43,7 +43,7 @@ class Stretch:
     """A run of samples without a gap, shape (n,) each; outputs are NaN where lost.
 
     `counts` are the measured outputs where they count, `noise` their uncertainty, `rests` x
-    where it rests, `begins` the same until the stem has travelled: there it is always put, since
+    where it rests, `begins` the same until the stem first moves: there it is always put, since
     nobody knows what held it before. `held` is x smoothed between its slips.
     """
 
