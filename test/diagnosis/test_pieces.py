@@ -171,6 +171,24 @@ def test_a_stem_that_creeps_at_first_is_not_held_where_it_seems_to_rest(noise):
     assert np.nanmax(np.abs(bench.residual(bench.run(complete(slow)), 'x'))) < 6.0
 
 
+@pytest.mark.parametrize('first', [200, 300])
+def test_a_stem_that_moves_when_the_record_begins_moves_on(first):
+    u = np.concatenate([np.full(n, v) for n, v in ((50, 70.0), (500, 20.0), (700, 90.0))])
+    slow = {**VALUES, 'T_g1': 12.0, 'T_g2': 60.0, 'f_s': 10.0}
+    slow |= {'p1_0': 70.0, 'p2_0': 70.0, 'x_0': 70.0}
+    time = 0.2 * np.arange(u.size)
+    (truth,) = Bench([Recording(time, u, p1=u)]).run(complete(slow))
+    x = truth[2] + 0.2 * np.random.default_rng(4).standard_normal(u.size)
+    seen = slice(first, None)
+    shown = (values[seen] for values in (u, truth[0], truth[1], x))
+    bench = Bench([Recording(time[: u.size - first], *shown)])
+    speed = (truth[2][first + 20] - truth[2][first]) / 4.0
+    assert bench.stretches[0].speed == pytest.approx(speed, rel=0.15)
+    start = {f'{name}_0': truth[row][first] for row, name in enumerate(('p1', 'p2', 'x'))}
+    result = bench.run(complete({**slow, **start}))
+    assert np.nanmax(np.abs(bench.residual(result, 'x'))) < 6.0
+
+
 def test_a_loop_is_seen_through_a_stem_held_where_it_was_measured():
     loop = {
         'positioner_loop.gain': 1.5,

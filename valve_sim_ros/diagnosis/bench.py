@@ -16,7 +16,7 @@ from ..model.pipeline import Array
 from ..model.scoring import DOUBTFUL
 from ..recordings.recording import OUTPUTS, Recording
 from .errors import DiagnosisError
-from .readings import answers_to_steps, filled, smooth, steps_kept, still, wild
+from .readings import answers_to_steps, filled, slope_of, smooth, steps_kept, still, wild
 from .stretch import CAUGHT, Grid, HELD, RESTS, Stretch
 
 OUTLIER = 6.0
@@ -34,6 +34,8 @@ TRAVEL, MOST_UNSETTLED = 8.0, 0.1
 SLACK, SLACK_SHARE = 0.03, 0.01
 """By so much p2 may be off where the stem begins to slip [% of span], but by no more than this part
 of the friction: a stem that is nearly free always begins to slip."""
+CREEPS = 3.0
+"""A stem that drifts by more before it has surely moved is in motion when the record begins [noise]."""
 APART = 6.0
 """A stem is caught where it is further than this from where it should rest [noise]."""
 LEAST_RESTS = 20
@@ -71,16 +73,20 @@ class Bench:
                 values[wild(values, OUTLIER * self.noise[name])] = np.nan
             stretch.noise = {n: self._uncertainty(n, v) for n, v in stretch.measured.items()}
             samples = np.arange(stretch.u.size)
-            travelled = self._travelled(stretch, TRAVEL) + 10
+            travelled = self._travelled(stretch.measured[self.signals[-1]], TRAVEL) + 10
             settled = samples >= min(travelled, int(MOST_UNSETTLED * samples.size))
             stretch.recount({n: np.where(settled, v, np.nan) for n, v in stretch.measured.items()})
             if 'x' in self.signals:
                 whole = filled(stretch.measured['x'])
                 stretch.held = smooth(whole, self.noise['x'])
                 stretch.rests = np.where(still(whole, self.noise['x']), stretch.held, np.nan)
-                # no longer: one that creeps on seems to rest
-                departed = self._travelled(stretch, 0.0)
-                stretch.begins = np.where(samples < departed, stretch.rests, np.nan)
+                departed = self._travelled(stretch.held, 0.0) or samples.size
+                slope = slope_of(whole[:departed])
+                if abs(slope) * departed > CREEPS * self.noise['x']:
+                    # one that creeps seems to rest
+                    stretch.speed = slope / float(np.median(np.diff(stretch.time)))
+                else:
+                    stretch.begins = np.where(samples < departed, stretch.rests, np.nan)
         self.size = sum(stretch.u.size for stretch in self.stretches)
 
     def run(
@@ -165,7 +171,8 @@ class Bench:
         suffix = f'.{index}' if index else ''
         first = self.stretches[index].first
         p1, p2, x = (values.get(f'{name}_0{suffix}', first[name]) for name in OUTPUTS)
-        return np.array([p1, p2, x, 0.0, 0.0, 0.0, p1, p1, 0.0])
+        v = self.stretches[index].speed
+        return np.array([p1, p2, x, v, np.sign(v), abs(np.sign(v)), p1, p1, 0.0])
 
     def residual(self, results: Sequence[Array], name: str) -> Array:
         """Return measured minus model of a signal over its noise, NaN where not counted.
@@ -260,13 +267,11 @@ class Bench:
         """Return how far p1 moves up to each sample of a result [%], shape (n,)."""
         return np.abs(np.diff(result[0], prepend=result[0, :1]))
 
-    def _travelled(self, stretch: Stretch, far: float) -> int:
-        """Return the first sample by which the valve is `far` away, beyond any noise; 0 if never.
+    def _travelled(self, values: Array, far: float) -> int:
+        """Return the first sample by which the last signal is `far` away, beyond noise; 0 if never.
 
-        Plays and friction forget the unknown state before the record as it travels: the last
-        signal is watched.
+        Plays and friction forget the unknown state before the record as the valve travels.
         """
-        values = stretch.measured[self.signals[-1]]
         known = np.flatnonzero(np.isfinite(values))
         if not known.size:
             return 0

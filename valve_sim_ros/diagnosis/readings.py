@@ -14,8 +14,8 @@ FINEST, COARSEST, ON_STEPS, MOST_STEPS = 0.1, 10.0, 0.6, 3
 """Steps of a coarse sensor [%], how well x keeps to them (1: exactly), and how many are told."""
 BIN, LONG = 0.01, 32
 """Bins in which x is counted [%], and how much longer their spectrum is than the span."""
-REST = 5
-"""Samples over which two means agree while the stem rests."""
+REST, FEW = 5, 8
+"""Samples over which two means agree while the stem rests, and too few for a slope."""
 NEAR, ALIKE = 15, 3.0
 """Samples on either side over which x is smoothed, those that differ by less than this [noise]."""
 LARGE, UNMOVED, ANSWERED = 16.0, 4.0, 0.5
@@ -47,6 +47,13 @@ def still(x: Array, noise: float) -> Mask:
     still = np.zeros(x.size, dtype=bool)
     still[2 * REST - 1 :] = np.abs(mean[REST:] - mean[:-REST]) < 2.0 * noise * np.sqrt(2.0 / REST)
     return still
+
+
+def slope_of(values: Array) -> float:
+    """Return the slope of a straight line through some values, per sample; 0 if they are few."""
+    if values.size < FEW:
+        return 0.0
+    return float(np.polyfit(np.arange(values.size), values, 1)[0])
 
 
 def wild(values: Array, limit: float) -> Mask:

@@ -44,7 +44,8 @@ class Stretch:
 
     `counts` are the measured outputs where they count, `noise` their uncertainty, `rests` x
     where it rests, `begins` the same until the stem first moves: there it is always put, since
-    nobody knows what held it before. `held` is x smoothed between its slips.
+    nobody knows what held it before. `speed` is that of a stem that moves at the beginning [%/s],
+    `held` is x smoothed between its slips.
     """
 
     time: Array
@@ -54,6 +55,7 @@ class Stretch:
     noise: dict[str, Array] = field(default_factory=dict)
     rests: Array = field(default_factory=lambda: np.empty(0))
     begins: Array = field(default_factory=lambda: np.empty(0))
+    speed: float = 0.0
     held: Array = field(default_factory=lambda: np.empty(0))
     _grids: dict[Any, Grid] = field(default_factory=dict)
 

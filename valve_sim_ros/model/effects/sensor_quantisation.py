@@ -33,6 +33,7 @@ EFFECT = Effect(
             starts=tuple(0.1 * 1.012**k for k in range(320)),
             step=0.004,
             shown='steps',
+            usual=(0.4, 6.0),
         ),
     ),
     slots={'sensor_slot': sensor},
