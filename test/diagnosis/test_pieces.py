@@ -11,7 +11,7 @@ from scipy.signal import lfilter
 from valve_sim_ros import simulate
 from valve_sim_ros.diagnosis import odds
 from valve_sim_ros.diagnosis.adequacy import Leftover, leftover
-from valve_sim_ros.diagnosis.base_valve import starting_valve
+from valve_sim_ros.diagnosis.base_valve import find_base, starting_valve
 from valve_sim_ros.diagnosis.bench import Bench
 from valve_sim_ros.diagnosis.conditions import places
 from valve_sim_ros.diagnosis.decision import TestSignal
@@ -109,7 +109,8 @@ def test_where_pressure_creeps_the_moment_of_a_slip_is_forgiven():
 @pytest.mark.parametrize('drive', [(), ('p1', 'p2')])
 def test_a_stem_that_is_nearly_free_is_forgiven_nothing(drive):
     bench = Bench([recording(0.1)])
-    free = {**VALUES, 'T_g1': 0.02, 'T_g2': 0.02, 'f_s': 0.01, 'p1_0': 0.5, 'p2_0': 0.5, 'x_0': 0.5}
+    free = {**VALUES, 'T_g1': 0.02, 'T_g2': 0.02, 'f_s': 0.01}
+    free |= {'p1_0': 0.5, 'p2_0': 0.5, 'x_0': 0.5}
     results = bench.run(complete(free), (), drive)
     assert np.mean(results[0][3]) < 0.02
     assert np.mean(np.abs(bench.residual(results, 'x')) > 5.0) > 0.3
@@ -220,6 +221,29 @@ def test_single_steps_of_the_command_show_whether_arrivals_are_mixed():
         bench = Bench([Recording(record.time, record.u, p1)])
         wrong = [np.tile(1.2 * record.u, (4, 1))]  # an effect spoils the base valve
         assert bench.mixed_arrivals(wrong) == mixed
+
+
+@pytest.mark.parametrize('signals', [('p1', 'p2'), ('p2',)])
+def test_steps_that_came_before_the_sample_are_told_by_what_follows(signals):
+    u = commands(3000)
+    steps = np.flatnonzero(np.diff(u)) + 1
+    early = steps[1::3]
+    sent = u.copy()
+    sent[early - 1] = u[early]
+    values = {n: v for n, v in complete(VALUES).items() if n not in ('phase', 'damping')}
+    run = simulate(sent, parameters={n: v for n, v in values.items() if '/' not in n})
+    noise = 0.2 * np.random.default_rng(6).standard_normal((2, u.size))
+    p1, p2 = run.p1.copy(), run.p2 + noise[1]
+    p1[early - 1] = p1[early - 2]  # taken a little before the command
+    measured = {'p1': p1 + noise[0], 'p2': p2}
+    fitter = Fitter(Bench([Recording(run.t, u, **{name: measured[name] for name in signals})]))
+    valve = starting_valve(fitter.bench)
+    for group in groups(signals):
+        valve = find_base(fitter, group, valve, ())
+    assert np.abs(u - sent).max() > 50.0
+    # only steps too small to tell may be left
+    assert np.abs(fitter.bench.stretches[0].u - sent).max() < 10.0
+    assert leftover(fitter.residuals(valve, 'p2')).excess < 0.05
 
 
 def test_an_outlier_is_a_value_that_neighbours_who_agree_do_not_share():

@@ -32,10 +32,10 @@ LEAST_AT_REST = 0.3
 TRAVEL, MOST_UNSETTLED = 8.0, 0.1
 """A record counts once the valve has travelled this far [%], or after this share."""
 SLACK, SLACK_SHARE = 0.03, 0.01
-"""By so much p2 may be off where the stem begins to slip [% of span], but by no more than this part
-of the friction: a stem that is nearly free always begins to slip."""
+"""By so much p2 may be off where the stem begins to slip [% of span], but by no more than this
+part of the friction: a stem that is nearly free always begins to slip."""
 CREEPS = 3.0
-"""A stem that drifts by more before it has surely moved is in motion when the record begins [noise]."""
+"""A stem that drifts by more before it has surely moved moves when the record begins [noise]."""
 APART = 6.0
 """A stem is caught where it is further than this from where it should rest [noise]."""
 LEAST_RESTS = 20
@@ -268,7 +268,7 @@ class Bench:
         return np.abs(np.diff(result[0], prepend=result[0, :1]))
 
     def _travelled(self, values: Array, far: float) -> int:
-        """Return the first sample by which the last signal is `far` away, beyond noise; 0 if never.
+        """Return the first sample by which the last signal is `far` away; 0 if it never is.
 
         Plays and friction forget the unknown state before the record as the valve travels.
         """

@@ -91,6 +91,15 @@ class Stretch:
         self.counts = dict(counts)
         self._grids.clear()
 
+    def put_earlier(self, steps: Rows) -> None:
+        """Let steps of the command come a sample earlier; p1 does not count there any more."""
+        self.u[steps - 1] = self.u[steps]
+        for each in (self.measured, self.counts):
+            if 'p1' in each:
+                each['p1'] = each['p1'].copy()
+                each['p1'][steps - 1] = np.nan
+        self._grids.clear()
+
     def _moved(self, phase: float, drive: tuple[str, ...]) -> Grid:
         n = self.time.size
         changed = np.flatnonzero(np.diff(self.u)) + 1

@@ -64,9 +64,9 @@ def run_scored(
     scale : ndarray, shape (n,)
         One over its noise [1/%].
     slack : float
-        As long as p2 creeps, less than this in a sample, and is this close to where the stem begins
-        to slip, the moment of the slip is in doubt; errors of x beyond DOUBTFUL do not count then
-        [% of span].
+        As long as p2 creeps, less than this in a sample, and is this close to where the stem
+        begins to slip, the moment of the slip is in doubt; errors of x beyond DOUBTFUL do not
+        count then [% of span].
     apart : float
         A stem no further than this from where it should rest goes on by itself [% of span].
     bound : float
