@@ -56,6 +56,16 @@ def recording(noise=0.0, **effects):
     return Recording(s.t, u, **noisy)
 
 
+def slow_valve(levels, noise, **lags):
+    """Return the values of a valve that lags, its record without noise, and one of it with."""
+    u = np.concatenate([np.full(n, value) for n, value in levels])
+    slow = {**VALUES, **lags, **{f'{name}_0': u[0] for name in ('p1', 'p2', 'x')}}
+    time = 0.2 * np.arange(u.size)
+    (truth,) = Bench([Recording(time, u, p1=u)]).run(complete(slow))
+    noisy = truth[2] + noise * np.random.default_rng(4).standard_normal(u.size)
+    return slow, *(Recording(time, u, truth[0], truth[1], x) for x in (truth[2], noisy))
+
+
 def test_the_bench_runs_the_same_valve_as_simulate():
     record = recording()
     bench = Bench([record])
@@ -84,20 +94,9 @@ def test_score_is_the_robust_square_of_the_residual_and_stops_at_its_bound():
 
 
 def test_where_pressure_creeps_the_moment_of_a_slip_is_forgiven():
-    u = np.concatenate([np.full(20, 20.0), *(np.full(600, v) for v in (70.0, 30.0, 62.0, 25.0))])
-    slow = {
-        **VALUES,
-        'T_g1': 20.0,
-        'T_g2': 25.0,
-        'f_s': 7.0,
-        'p1_0': 20.0,
-        'p2_0': 20.0,
-        'x_0': 20.0,
-    }
-    time = 0.2 * np.arange(u.size)
-    (truth,) = Bench([Recording(time, u, p1=u)]).run(complete(slow))
-    noise = 0.2 * np.random.default_rng(4).standard_normal(u.size)
-    bench = Bench([Recording(time, u, truth[0], truth[1], truth[2] + noise)])
+    levels = ((20, 20.0), (600, 70.0), (600, 30.0), (600, 62.0), (600, 25.0))
+    slow, _, record = slow_valve(levels, 0.2, T_g1=20.0, T_g2=25.0, f_s=7.0)
+    bench = Bench([record])
     own, little, much = (
         bench.residual(bench.run(complete({**slow, 'f_s': f_s})), 'x') for f_s in (7.0, 7.05, 7.5)
     )
@@ -162,30 +161,20 @@ def test_a_stem_is_where_it_was_seen_until_it_travels():
 
 @pytest.mark.parametrize('noise', [0.1, 0.3])
 def test_a_stem_that_creeps_at_first_is_not_held_where_it_seems_to_rest(noise):
-    u = np.concatenate([np.full(n, v) for n, v in ((50, 70.0), (150, 20.0), (700, 90.0))])
-    slow = {**VALUES, 'T_g1': 12.0, 'T_g2': 60.0, 'f_s': 10.0}
-    slow |= {'p1_0': 70.0, 'p2_0': 70.0, 'x_0': 70.0}
-    time = 0.2 * np.arange(u.size)
-    (truth,) = Bench([Recording(time, u, p1=u)]).run(complete(slow))
-    x = truth[2] + noise * np.random.default_rng(4).standard_normal(u.size)
-    bench = Bench([Recording(time, u, truth[0], truth[1], x)])
+    levels = ((50, 70.0), (150, 20.0), (700, 90.0))
+    slow, _, record = slow_valve(levels, noise, T_g1=12.0, T_g2=60.0, f_s=10.0)
+    bench = Bench([record])
     assert np.nanmax(np.abs(bench.residual(bench.run(complete(slow)), 'x'))) < 6.0
 
 
 @pytest.mark.parametrize('first', [200, 300])
 def test_a_stem_that_moves_when_the_record_begins_moves_on(first):
-    u = np.concatenate([np.full(n, v) for n, v in ((50, 70.0), (500, 20.0), (700, 90.0))])
-    slow = {**VALUES, 'T_g1': 12.0, 'T_g2': 60.0, 'f_s': 10.0}
-    slow |= {'p1_0': 70.0, 'p2_0': 70.0, 'x_0': 70.0}
-    time = 0.2 * np.arange(u.size)
-    (truth,) = Bench([Recording(time, u, p1=u)]).run(complete(slow))
-    x = truth[2] + 0.2 * np.random.default_rng(4).standard_normal(u.size)
-    seen = slice(first, None)
-    shown = (values[seen] for values in (u, truth[0], truth[1], x))
-    bench = Bench([Recording(time[: u.size - first], *shown)])
-    speed = (truth[2][first + 20] - truth[2][first]) / 4.0
+    levels = ((50, 70.0), (500, 20.0), (700, 90.0))
+    slow, truth, record = slow_valve(levels, 0.2, T_g1=12.0, T_g2=60.0, f_s=10.0)
+    bench = Bench([record.slice(0.2 * first, np.inf)])
+    speed = (truth.x[first + 20] - truth.x[first]) / 4.0
     assert bench.stretches[0].speed == pytest.approx(speed, rel=0.15)
-    start = {f'{name}_0': truth[row][first] for row, name in enumerate(('p1', 'p2', 'x'))}
+    start = {f'{name}_0': truth.output(name)[first] for name in ('p1', 'p2', 'x')}
     result = bench.run(complete({**slow, **start}))
     assert np.nanmax(np.abs(bench.residual(result, 'x'))) < 6.0
 

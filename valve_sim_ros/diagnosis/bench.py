@@ -268,7 +268,7 @@ class Bench:
         return np.abs(np.diff(result[0], prepend=result[0, :1]))
 
     def _travelled(self, values: Array, far: float) -> int:
-        """Return the first sample by which the last signal is `far` away; 0 if it never is.
+        """Return the first sample by which values of the last signal are `far` away; 0 if none is.
 
         Plays and friction forget the unknown state before the record as the valve travels.
         """
