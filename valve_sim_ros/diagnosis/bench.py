@@ -13,7 +13,7 @@ from ..model.composition import compose
 from ..model.kernels import scored
 from ..model.parameters import DELTA
 from ..model.pipeline import Array
-from ..model.scoring import DOUBTFUL
+from ..model.scoring import BESIDE
 from ..recordings.recording import OUTPUTS, Recording
 from .errors import DiagnosisError
 from .readings import answers_to_steps, filled, slope_of, smooth, steps_kept, still, wild
@@ -95,7 +95,7 @@ class Bench:
         effects: Sequence[str] = (),
         drive: Sequence[str] = (),
     ) -> list[Array]:
-        """Return p1, p2, x of a valve, and 1 where a slip's moment is in doubt: (4, n) each.
+        """Return p1, p2, x of a valve, and the x to hold beside the measured one: (4, n) each.
 
         Parameters
         ----------
@@ -146,7 +146,7 @@ class Bench:
         if HELD in drive:
             theta[STUCK] = IMMENSE
         grid = self.stretches[index].grid(values.get('phase', 0.0), tuple(drive))
-        outputs = np.empty((len(OUTPUTS) + 1, grid.u.size))
+        outputs = np.empty((BESIDE + 1, grid.u.size))
         score = scored(bool(effects))(
             grid.u,
             grid.dt,
@@ -177,17 +177,11 @@ class Bench:
     def residual(self, results: Sequence[Array], name: str) -> Array:
         """Return measured minus model of a signal over its noise, NaN where not counted.
 
-        Where the moment of a slip is in doubt, errors of x beyond the noise do not count.
+        Where the moment of a slip is in doubt, x may be anywhere between before and after.
         """
-        row = OUTPUTS.index(name)
-        residuals = []
-        for stretch, result in zip(self.stretches, results, strict=True):
-            residual = (stretch.counts[name] - result[row]) / stretch.noise[name]
-            if name == 'x':
-                cut = np.clip(residual, -DOUBTFUL, DOUBTFUL)
-                residual = np.where(result[-1] > 0.0, cut, residual)
-            residuals.append(residual)
-        return np.concatenate(residuals)
+        row = BESIDE if name == 'x' else OUTPUTS.index(name)
+        pairs = zip(self.stretches, results, strict=True)
+        return np.concatenate([(s.counts[name] - r[row]) / s.noise[name] for s, r in pairs])
 
     def _uncertainty(self, name: str, values: Array) -> Array:
         """Return the noise of each sample, more where the signal moves: sample times jitter."""

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """A run over a record that is held against what was measured, for searches."""
 
+import math
 from typing import Any
 
 from numba import njit
@@ -14,8 +15,8 @@ HUBER = 4.0
 """Error beyond which a score grows linearly [noise]."""
 DOUBTFUL = 1.0
 """Largest error that counts where the moment of a slip is in doubt [noise]."""
-STEM = 2
-"""Row of x among the outputs."""
+STEM, BESIDE = 2, 3
+"""Rows of x, and of the x to hold beside the measured one, among the outputs."""
 
 
 @njit(forceinline=True)
@@ -25,6 +26,38 @@ def penalty(value: float, target: float, scale: float) -> float:
         return 0.0
     error = abs(value - target) * scale
     return error * error if error <= HUBER else HUBER * (2.0 * error - HUBER)
+
+
+@njit
+def forgive(outputs: Array, first: int, last: int, target: Array, scale: Array) -> float:
+    """Let errors of x be no larger than if the stem slipped at any moment of some samples.
+
+    Parameters
+    ----------
+    outputs, target, scale
+        As for `run_scored`; `outputs` receives the position nearest to the target among those the
+        stem passes, but none that is closer than DOUBTFUL unless x itself is.
+    first, last : int
+        The samples, `last` not among them.
+
+    Returns
+    -------
+    float
+        By how much that lowers the score.
+    """
+    x = outputs[STEM, first:last]
+    low, high = x.min(), x.max()
+    relief = 0.0
+    for k in range(first, last):
+        error = (outputs[STEM, k] - target[k]) * scale[k]
+        if abs(error) > DOUBTFUL:
+            beside = min(max(target[k], low), high)
+            if abs(beside - target[k]) * scale[k] < DOUBTFUL:
+                beside = target[k] + math.copysign(DOUBTFUL, error) / scale[k]
+            outputs[BESIDE, k] = beside
+            relief += penalty(outputs[STEM, k], target[k], scale[k])
+            relief -= penalty(beside, target[k], scale[k])
+    return relief
 
 
 @njit
@@ -55,8 +88,8 @@ def run_scored(
         p1 and p2 that the stages after them receive, and the x at which the stem is put to rest
         where it is not near [% of span]; NaN where the model's own value goes on.
     outputs : ndarray, shape (4, n)
-        Receives p1, p2, x as the model has them before they are replaced [% of span], and 1 where
-        the moment of a slip is in doubt, else 0.
+        Receives p1, p2, x as the model has them before they are replaced, and the x to hold
+        beside the measured one, another where the moment of a slip is in doubt [% of span].
     signal : int
         0, 1 or 2: the output to score.
     target : ndarray, shape (n,)
@@ -64,9 +97,8 @@ def run_scored(
     scale : ndarray, shape (n,)
         One over its noise [1/%].
     slack : float
-        As long as p2 creeps, less than this in a sample, and is this close to where the stem
-        begins to slip, the moment of the slip is in doubt; errors of x beyond DOUBTFUL do not
-        count then [% of span].
+        Where the stem begins to slip while p2 creeps, less than this in a sample, the moment of
+        the slip is in doubt as long as p2 is this close: see `forgive` [% of span].
     apart : float
         A stem no further than this from where it should rest goes on by itself [% of span].
     bound : float
@@ -82,9 +114,9 @@ def run_scored(
     now = state_from(state)
     transition = other = transition_over(0.0, parameters, finest)
     score = 0.0
-    moving = doubtful = False
-    slip = relief = 0.0  # p2 where the last slip began; what the score loses if one begins now
-    first = 0  # the first sample that would be in doubt then
+    moving, doubtful = True, False  # it rests only once some time has shown it
+    slip = 0.0  # p2 where the stem began to slip
+    first, pending = 0, 0.0  # start and score of the time in doubt, or of what would be by now
     for k in range(u.size):
         if dt[k] != transition.dt:  # steps often alternate between two lengths
             transition, other = other, transition
@@ -92,35 +124,31 @@ def run_scored(
                 transition = transition_over(dt[k], parameters, finest)
         moved, before = moving, now.x
         now, x = advance_sample(u[k], now, parameters, transition, effects, memory)
-        moving = now.x != before
+        moving = now.x != before or (moved and dt[k] == 0.0)
         outputs[0, k] = now.p1
         outputs[1, k] = now.p2
         outputs[2, k] = x
-        while first < k and abs(outputs[1, first] - now.p2) >= slack:
-            if signal == STEM:
-                added = penalty(outputs[STEM, first], target[first], scale[first])
-                relief -= max(added - DOUBTFUL, 0.0)
-            first += 1
-        if moving and not moved:
-            slip = now.p2
-            doubtful = k > 0 and abs(slip - outputs[1, k - 1]) < slack
-            if doubtful:
-                outputs[3, first:k] = 1.0
-                score -= relief
-        doubtful = doubtful and abs(now.p2 - slip) < slack
-        outputs[3, k] = 1.0 if doubtful else 0.0
+        outputs[BESIDE, k] = x
         added = penalty(outputs[signal, k], target[k], scale[k])
-        beyond = max(added - DOUBTFUL, 0.0) if signal == STEM else 0.0
-        score += added - beyond if doubtful else added
-        if moving or doubtful:
-            first, relief = k + 1, 0.0
-        else:
-            relief += beyond
-        if score - relief > bound:
+        score += added
+        if signal == STEM:
+            if doubtful and abs(now.p2 - slip) >= slack:
+                score -= forgive(outputs, first, k, target, scale)
+                doubtful, first, pending = False, k, 0.0
+            while not doubtful and first < k and abs(outputs[1, first] - now.p2) >= slack:
+                pending -= penalty(outputs[STEM, first], target[first], scale[first])
+                first += 1
+            if moving and not (moved or doubtful):
+                doubtful, slip = first < k, now.p2
+            pending += added
+            if moving and not doubtful:
+                first, pending = k + 1, 0.0
+            if score - pending > bound:
+                break
+        elif score > bound:
             break
         p1, p2, rest = measured[0, k], measured[1, k], measured[2, k]
         rests = abs(rest - x) > apart
-        moving = moving and not rests
         now = State(
             p1 if p1 == p1 else now.p1,
             p2 if p2 == p2 else now.p2,
@@ -132,6 +160,8 @@ def run_scored(
             now.command,
             now.time,
         )
+    if doubtful:
+        score -= forgive(outputs, first, k + 1, target, scale)
     for index, value in enumerate(now):
         state[index] = value
     return score
