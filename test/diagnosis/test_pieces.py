@@ -19,6 +19,7 @@ from valve_sim_ros.diagnosis.descent import cost_of, descend, walk
 from valve_sim_ros.diagnosis.evolution import evolve
 from valve_sim_ros.diagnosis.fitting import Fitter, Valve
 from valve_sim_ros.diagnosis.proof import closed
+from valve_sim_ros.diagnosis.readings import straightened
 from valve_sim_ros.diagnosis.stages import groups
 from valve_sim_ros.diagnosis.stretch import CAUGHT, HELD
 from valve_sim_ros.diagnosis.unknowns import complete
@@ -202,6 +203,17 @@ def test_a_stem_that_moves_when_the_record_begins_moves_on(first):
     start = {f'{name}_0': truth.output(name)[first] for name in ('p1', 'p2', 'x')}
     result = bench.run(complete({**slow, **start}))
     assert np.nanmax(np.abs(bench.residual(result, 'x'))) < 6.0
+
+
+def test_a_stem_that_moves_is_smoothed_along_lines_up_to_steps_of_the_command():
+    slopes = (0.0, 0.5, -0.8, 0.1, -0.2)
+    x = 50.0 + np.cumsum(np.repeat(slopes, 40))
+    u = np.repeat(np.arange(5) * 20.0, 40)
+    x[40:] += 8.0  # a slip
+    noisy = x + 0.25 * np.random.default_rng(2).standard_normal(x.size)
+    error = straightened(noisy, np.append(u[1:], u[-1]), 0.25) - x
+    assert np.sqrt(np.mean(error**2)) < 0.45 * 0.25
+    assert np.abs(error).max() < 3.0 * 0.25
 
 
 def test_a_loop_is_seen_through_a_stem_held_where_it_was_measured():

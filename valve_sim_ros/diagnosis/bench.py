@@ -16,7 +16,16 @@ from ..model.pipeline import Array
 from ..model.scoring import BESIDE
 from ..recordings.recording import OUTPUTS, Recording
 from .errors import DiagnosisError
-from .readings import answers_to_steps, filled, slope_of, smooth, steps_kept, still, wild
+from .readings import (
+    answers_to_steps,
+    filled,
+    slope_of,
+    smooth,
+    steps_kept,
+    still,
+    straightened,
+    wild,
+)
 from .stretch import CAUGHT, Grid, HELD, RESTS, Stretch
 
 OUTLIER = 6.0
@@ -78,8 +87,10 @@ class Bench:
             stretch.recount({n: np.where(settled, v, np.nan) for n, v in stretch.measured.items()})
             if 'x' in self.signals:
                 whole = filled(stretch.measured['x'])
-                stretch.held = smooth(whole, self.noise['x'])
-                stretch.rests = np.where(still(whole, self.noise['x']), stretch.held, np.nan)
+                rests, smoothed = still(whole, self.noise['x']), smooth(whole, self.noise['x'])
+                straight = straightened(whole, stretch.u, self.noise['x'])
+                stretch.held = np.where(rests, smoothed, straight)
+                stretch.rests = np.where(rests, smoothed, np.nan)
                 departed = self._travelled(stretch.held, 0.0) or samples.size
                 slope = slope_of(whole[:departed])
                 if abs(slope) * departed > CREEPS * self.noise['x']:

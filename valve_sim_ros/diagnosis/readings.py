@@ -18,6 +18,9 @@ REST, FEW = 5, 8
 """Samples over which two means agree while the stem rests, and too few for a slope."""
 NEAR, ALIKE = 15, 3.0
 """Samples on either side over which x is smoothed, those that differ by less than this [noise]."""
+WIDTHS, MISFIT, BENDS = (3, 5, 9, 15, 31), 1.7, 5.0
+"""Samples through which a line is laid, its largest mean square error [noise squared], and steps
+of the command beyond which x may bend [%]."""
 LARGE, UNMOVED, ANSWERED = 16.0, 4.0, 0.5
 """A step of p1 that tells when it came; p1 has not moved yet; and part of it seen at once [noise,
 noise, share]."""
@@ -41,6 +44,35 @@ def smooth(x: Array, noise: float) -> Array:
     near = sliding_window_view(np.pad(x, NEAR, mode='edge'), 2 * NEAR + 1)
     alike = np.abs(near - middle[:, None]) < ALIKE * noise
     return np.where(alike, near, 0.0).sum(axis=1) / np.maximum(alike.sum(axis=1), 1)
+
+
+def straightened(x: Array, u: Array, noise: float) -> Array:
+    """Return x on the longest lines through it that its noise allows, its slips kept.
+
+    A step of the command u may bend x. Like the choice of windows by Goldenshluger and Nemirovski (1997), but a line must fit all
+    samples in its window.
+    """
+    bends = np.flatnonzero(np.abs(np.diff(u)) > BENDS) + 2
+    return np.concatenate([_on_lines(part, noise) for part in np.split(x, bends)])
+
+
+def _on_lines(x: Array, noise: float) -> Array:
+    """Return x on the longest lines that fit."""
+    smoothed, variance = x.copy(), np.ones(x.size)
+    for width in (w for w in WIDTHS if w <= x.size):
+        at = np.arange(width) - (width - 1) / 2.0
+        near = sliding_window_view(x, width)
+        mean, slope = near.mean(axis=1), near @ at / (at @ at)
+        off = np.abs(near - mean[:, None] - slope[:, None] * at) / noise
+        fits = (off.max(axis=1) < ALIKE) & (np.mean(off**2, axis=1) < MISFIT)
+        for place in (0, width // 2, width - 1):
+            rows = place + np.flatnonzero(fits)
+            own = 1.0 / width + at[place] ** 2 / (at @ at)
+            better = own < variance[rows]
+            rows = rows[better]
+            smoothed[rows] = (mean + slope * at[place])[fits][better]
+            variance[rows] = own
+    return smoothed
 
 
 def still(x: Array, noise: float) -> Mask:

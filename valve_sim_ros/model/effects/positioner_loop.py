@@ -58,10 +58,10 @@ EFFECT = Effect(
             '%',
             0.0,
             0.0,
-            100.0,
+            1000.0,
             'linear',
             'How far beyond the span of u it can drive the converter',
-            neutral=100.0,
+            neutral=1000.0,
             starts=(0.0,),
         ),
         EffectParameter(
