@@ -49,8 +49,8 @@ def smooth(x: Array, noise: float) -> Array:
 def straightened(x: Array, u: Array, noise: float) -> Array:
     """Return x on the longest lines through it that its noise allows, its slips kept.
 
-    A step of the command u may bend x. Like the choice of windows by Goldenshluger and Nemirovski (1997), but a line must fit all
-    samples in its window.
+    A step of the command u may bend x. Like the choice of windows by Goldenshluger and Nemirovski
+    (1997), but a line must fit all samples in its window.
     """
     bends = np.flatnonzero(np.abs(np.diff(u)) > BENDS) + 2
     return np.concatenate([_on_lines(part, noise) for part in np.split(x, bends)])
