@@ -16,7 +16,7 @@ from .refit import left_over
 from .seal import write_json
 from .unknown import UNKNOWN
 from .valves import base_valve
-from .visibility import LEFT, ROUNDED_NOISE, STEPS, visible, WANTED
+from .visibility import IMITATED, LEFT, ROUNDED_NOISE, STEPS, visible, WANTED
 
 Rng = np.random.Generator
 RUN_IN = 80.0
@@ -173,7 +173,8 @@ def draw(
             if max(seen[name].values()) < WANTED:
                 break
             unexplained[name] = _beyond_refit(plan, recorder, recorded, signals)
-            if max(unexplained[name].values()) < LEFT:
+            first = next(signal for signal in signals if seen[name][signal] >= LEFT)
+            if max(unexplained[name].values()) < LEFT or unexplained[name][first] < IMITATED:
                 break
         else:
             return Blind(plan, recorder, times, trace, seen, unexplained)

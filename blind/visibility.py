@@ -10,6 +10,9 @@ WANTED = 3.0
 """Least change of some measured signal [multiples of its noise]."""
 LEFT = 1.5
 """Least part of it that no other valve without the effect can imitate [multiples of noise]."""
+IMITATED = 0.1
+"""What leaves less in the first signal that it changes is imitated in those behind it, too, though
+a rough refit may err there [multiples of noise]."""
 STEPS, ROUNDED_NOISE = 4.0, 1.5
 """Least steps of a coarse sensor [multiples of noise]: noise on top, or rounded with it."""
 SHARE = 0.05
