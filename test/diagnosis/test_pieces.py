@@ -21,7 +21,7 @@ from valve_sim_ros.diagnosis.fitting import Fitter, Valve
 from valve_sim_ros.diagnosis.proof import closed
 from valve_sim_ros.diagnosis.readings import straightened
 from valve_sim_ros.diagnosis.stages import groups
-from valve_sim_ros.diagnosis.stretch import CAUGHT, HELD
+from valve_sim_ros.diagnosis.stretch import CAUGHT, HELD, ON_TIME
 from valve_sim_ros.diagnosis.unknowns import complete
 from valve_sim_ros.model.effects import CATALOGUE
 from valve_sim_ros.recordings.recording import Recording
@@ -175,8 +175,17 @@ def test_a_stem_is_put_to_rest_only_where_it_is_far_from_it():
     bench = Bench([Recording(record.time, record.u, record.p1, record.p2, x)])
     start = {'p1_0': 0.0, 'p2_0': 0.0, 'x_0': 0.0}
     right, stiff = complete({**VALUES, **start}), complete({**VALUES, **start, 'f_s': 9.0})
-    assert bench.score(right, (), 'x', (CAUGHT,)) == bench.score(right, (), 'x')
-    assert bench.score(stiff, (), 'x', (CAUGHT,)) < 0.8 * bench.score(stiff, (), 'x')
+    assert bench.score(right, (), 'x', (ON_TIME,)) == bench.score(right, (), 'x')
+    assert bench.score(stiff, (), 'x', (ON_TIME,)) < 0.8 * bench.score(stiff, (), 'x')
+
+
+def test_a_stem_that_is_caught_may_slip_a_little_late():
+    slow, _, record = slow_valve(CREEPING, 0.2, T_g1=20.0, T_g2=25.0, f_s=7.0)
+    bench = Bench([record])
+    late = complete({**slow, 'f_s': 7.25, 'f_d/f_s': slow['f_d/f_s'] * 7.0 / 7.25})
+    right = bench.score(complete(slow), (), 'x')
+    assert bench.score(late, (), 'x', (ON_TIME,)) > right + 200.0
+    assert bench.score(late, (), 'x', (CAUGHT,)) < right + 20.0
 
 
 def test_a_stem_is_where_it_was_seen_until_it_travels():

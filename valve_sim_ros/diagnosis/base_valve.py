@@ -90,7 +90,7 @@ def find_base(
     if not odds.suspicious(left, group.signal, fitter.bench.mixed):
         return best
     # caught where it is far from its rest, a stem that slips too late is only a little wrong
-    way = eased(problem)
+    way = eased(problem)[0]
     eases = found if way == problem else followed(way)
 
     def by_way_of_rests(each: Valve) -> Valve:

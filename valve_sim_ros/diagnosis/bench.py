@@ -26,7 +26,7 @@ from .readings import (
     straightened,
     wild,
 )
-from .stretch import CAUGHT, Grid, HELD, RESTS, Stretch
+from .stretch import CAUGHT, Grid, HELD, ON_TIME, RESTS, Stretch
 
 OUTLIER = 6.0
 """A single value further than this from both its neighbours is an outlier [noise]."""
@@ -40,9 +40,10 @@ LEAST_AT_REST = 0.3
 """Share of the samples of p1 that counts even so."""
 TRAVEL, MOST_UNSETTLED = 8.0, 0.1
 """A record counts once the valve has travelled this far [%], or after this share."""
-SLACK, SLACK_SHARE = 0.03, 0.01
+SLACK, SLACK_SHARE, EASE = 0.03, 0.01, 10.0
 """By so much p2 may be off where the stem begins to slip [% of span], but by no more than this
-part of the friction: a stem that is nearly free always begins to slip."""
+part of the friction: a stem that is nearly free always begins to slip; and how many times as much
+where the stem is put to rest: the moment of each slip says little there."""
 CREEPS = 3.0
 """A stem that drifts by more before it has surely moved moves when the record begins [noise]."""
 APART = 6.0
@@ -158,6 +159,9 @@ class Bench:
             theta[STUCK] = IMMENSE
         grid = self.stretches[index].grid(values.get('phase', 0.0), tuple(drive))
         outputs = np.empty((BESIDE + 1, grid.u.size))
+        slack = min(SLACK, SLACK_SHARE * values['f_s'])
+        if {RESTS, CAUGHT} & {*drive}:
+            slack *= EASE
         score = scored(bool(effects))(
             grid.u,
             grid.dt,
@@ -171,8 +175,8 @@ class Bench:
             OUTPUTS.index(signal),
             grid.targets.get(signal, grid.nothing),
             grid.scales.get(signal, grid.nothing),
-            min(SLACK, SLACK_SHARE * values['f_s']),
-            APART * self.noise['x'] if CAUGHT in drive and RESTS not in drive else 0.0,
+            slack,
+            APART * self.noise['x'] if {CAUGHT, ON_TIME} & {*drive} else 0.0,
             bound,
         )
         return outputs, grid, score

@@ -13,15 +13,16 @@ from .bench import Bench
 from .descent import descend, walk
 from .evolution import evolve
 from .stages import Candidate, Group
-from .stretch import CAUGHT, PUT_TO_REST
+from .stretch import CAUGHT, ON_TIME, PUT_TO_REST
 from .unknowns import complete, PHASE, to_point, to_values, Unknown
 
 HOPELESS = 1e3
 """Residual of a run that is not finite [noise]."""
 SHORT, LONG = 4, 20
 """Steps of a descent that only shows where it leads, and of one to the bottom."""
-SPREAD, NARROW = 5.0, 3.0
-"""Standard deviation with which an evolution begins, and near an optimum [steps of unknowns]."""
+SPREAD, NARROW, FINE = 5.0, 3.0, 1.0
+"""Standard deviation with which an evolution begins, near an optimum, and where a train of slips
+hangs on every step [steps of unknowns]."""
 POPULATION = 14
 GENERATIONS, MOST_TURNS = 40, 3
 """Generations of an evolution that refines a valve, and most evolutions in turn."""
@@ -42,10 +43,15 @@ Problem = tuple[tuple[Unknown, ...], str, tuple[str, ...]]
 """What a fit varies, the signal it looks at, and the signals that drive the stages."""
 
 
-def eased(problem: Problem) -> Problem:
-    """Return the problem in which a stem is caught where it is far from its rest."""
+def eased(problem: Problem) -> list[Problem]:
+    """Return the problem after two easier ones in which a stem is caught where it is far off.
+
+    First the moment of a slip hardly counts, then it does.
+    """
     unknowns, signal, drive = problem
-    return problem if PUT_TO_REST & {*drive} else (unknowns, signal, (*drive, CAUGHT))
+    if PUT_TO_REST & {*drive}:
+        return [problem]
+    return [*((unknowns, signal, (*drive, how)) for how in (CAUGHT, ON_TIME)), problem]
 
 
 def by_cost(valve: Valve) -> float:
@@ -145,10 +151,11 @@ class Fitter:
         valve = self.fit(valve, problem)
         if 'f_s' not in (unknown.name for unknown in problem[0]):
             return valve
-        way = eased(problem)
-        if way != problem:
-            eases = self.fit(self.evolve(valve, way, GENERATIONS, NARROW), way, SHORT)
-            valve = min(valve, self.fit(eases, problem), key=by_cost)
+        there = valve
+        for way in eased(problem):
+            spread = FINE if way == problem else NARROW
+            there = self.fit(self.evolve(there, way, GENERATIONS, spread), way)
+        valve = min(valve, there, key=by_cost)
         for _ in range(MOST_TURNS):
             more = self.evolve(valve, problem, GENERATIONS, NARROW)
             more = self.fit(more, problem)

@@ -164,7 +164,8 @@ def climb(
                 rungs, rung = both[:-1], both[-1]
             elif rung.closed < odds.EXPLAINED and rung.after.excess > odds.CLEAN:
                 guess = rung
-                if rung.closed < odds.LEAST_FIRST:
+                strayed = CATALOGUE[rung.effect].rugged and not PUT_TO_REST & {*fitter.drive}
+                if rung.closed < odds.LEAST_FIRST or strayed:
                     break
             rungs.append(rung)
             now, before = rung.valve, rung.after

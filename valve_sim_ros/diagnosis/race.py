@@ -27,6 +27,8 @@ MOST_STARTS, FEWER_STARTS = 24, 8
 so many of the best."""
 SCREENED, FINISHERS, REFINED = 3, 5, 2
 """How many starts of a candidate are followed, runners refitted, and refined to the end."""
+FOLLOWED = 30
+"""For how many generations each start is followed where a fit has many valleys."""
 SPOTLESS, FAR_AHEAD, BEHIND = 0.1, 0.2, 0.5
 """Where the best leaves no more than this excess, or this part of the cost, runners short of more
 than a part of its gain are not followed."""
@@ -155,7 +157,7 @@ def _screened(
         candidates=(*valve.candidates, candidate),
     )
     problem = fitter.problem(group, there)
-    way = eased(problem) if group.has_stem else problem
+    way = eased(problem)[0] if group.has_stem else problem
     usual = {**candidate.neutral, **valve.values}
     if len(own) > MOST_STARTS:
         costs = [fitter.scan(there, [{**usual, **start}], way)[0].cost for start in own]
@@ -170,7 +172,9 @@ def _screened(
         return sorted(each, key=by_cost)[:count]
 
     found = best(problem, SCREENED)
-    if way != problem:
+    if CATALOGUE[candidate.effect].rugged:
+        found += [fitter.evolve(each, way, FOLLOWED) for each in best(way, SCREENED)]
+    elif way != problem:
         found += [fitter.fit(each, way, SHORT) for each in best(way, 1)]
     steps = SHORT if group.has_stem else LONG
     return min((fitter.fit(each, problem, steps) for each in found), key=by_cost)

@@ -14,10 +14,11 @@ from ..model.pipeline import Array
 from ..recordings.recording import OUTPUTS
 
 KEPT_GRIDS = 60
-RESTS, CAUGHT, HELD = 'x', 'x caught', 'x held'
+RESTS, CAUGHT, ON_TIME, HELD = 'x', 'x caught', 'x caught on time', 'x held'
 """Drives by which a stem is put where it was measured: whenever that rests; only where it is far
-from there, which leaves a right valve alone; and at every moment."""
-PUT_TO_REST = {RESTS, CAUGHT}
+from there, which leaves a right valve alone; the same, while slips must come at the right moment;
+and at every moment."""
+PUT_TO_REST = {RESTS, CAUGHT, ON_TIME}
 STEM = OUTPUTS.index('x')
 Rows = npt.NDArray[np.intp]
 

@@ -158,6 +158,8 @@ class Effect:
         Place along the signal path among the effects of one slot.
     laborious : bool
         A run with it takes many times as long: a search tries others first.
+    rugged : bool
+        A fit of it has many valleys: a search follows each of its starts further.
     twins : mapping of str to str
         Effects that look alike, each with what tells them apart.
     variants : tuple of tuple of str
@@ -182,6 +184,7 @@ class Effect:
     stride: float = math.inf
     order: int = 0
     laborious: bool = False
+    rugged: bool = False
     twins: Mapping[str, str] = field(default_factory=dict)
     variants: tuple[tuple[str, ...], ...] = ()
     balance: Callable[..., float] | None = None

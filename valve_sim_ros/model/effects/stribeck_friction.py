@@ -138,6 +138,7 @@ EFFECT = Effect(
     symptom='Slow motion meets almost static friction; repeated slips whose size varies.',
     confirm='Slow and fast ramps: the offset p2-x while moving depends on the speed.',
     laborious=True,
+    rugged=True,
     twins={
         'presliding': 'presliding shows as motion below f_s: small reversals',
         'dwell_friction': 'that one depends on the time at rest: steps after short and long rests',
