@@ -42,6 +42,14 @@ def test_that_the_same_record_is_made_again(made, tmp_path):
         assert (tmp_path / part).read_bytes() == (made / part).read_bytes()
 
 
+def test_that_no_effect_is_drawn_that_another_valve_imitates(tmp_path):
+    # the first draw of this one was a row of plays that a wider play of the valve equals
+    sets.generate_one('singles', 'test', ('p1', 'p2', 'x'), 67, tmp_path, 18)
+    key = read_json(tmp_path / 'keys' / '0019.json')
+    assert key['effects'] == ['hysteresis']
+    assert key['unexplained_in_noise']['hysteresis']['p1'] >= visibility.IMITATED
+
+
 def test_that_the_halves_differ(made, tmp_path):
     sets.generate_one('singles', 'test', ('p2', 'x'), 5, tmp_path, 0)
     other = read_json(tmp_path / 'keys/0001.json')

@@ -214,6 +214,19 @@ def test_a_stem_that_moves_when_the_record_begins_moves_on(first):
     assert np.nanmax(np.abs(bench.residual(result, 'x'))) < 6.0
 
 
+def test_a_positioner_can_be_given_any_gain_of_the_catalogue():
+    u = np.repeat([90.0, 5.0], 200)
+    run = simulate(
+        u,
+        parameters={
+            'effects': ['positioner_loop'],
+            'positioner_loop.gain': 3.0,
+            'positioner_loop.overdrive': 1000.0,
+        },
+    )
+    assert run.p1.min() < -150.0
+
+
 def test_a_stem_that_moves_is_smoothed_along_lines_up_to_steps_of_the_command():
     slopes = (0.0, 0.5, -0.8, 0.1, -0.2)
     x = 50.0 + np.cumsum(np.repeat(slopes, 40))

@@ -87,14 +87,14 @@ class Bench:
             settled = samples >= min(travelled, int(MOST_UNSETTLED * samples.size))
             stretch.recount({n: np.where(settled, v, np.nan) for n, v in stretch.measured.items()})
             if 'x' in self.signals:
-                whole = filled(stretch.measured['x'])
-                rests, smoothed = still(whole, self.noise['x']), smooth(whole, self.noise['x'])
-                straight = straightened(whole, stretch.u, self.noise['x'])
+                whole, noise = filled(stretch.measured['x']), self.noise['x']
+                rests, smoothed = still(whole, noise), smooth(whole, noise)
+                straight = straightened(whole, stretch.u, noise)
                 stretch.held = np.where(rests, smoothed, straight)
                 stretch.rests = np.where(rests, smoothed, np.nan)
                 departed = self._travelled(stretch.held, 0.0) or samples.size
                 slope = slope_of(whole[:departed])
-                if abs(slope) * departed > CREEPS * self.noise['x']:
+                if abs(slope) * departed > CREEPS * noise:
                     # one that creeps seems to rest
                     stretch.speed = slope / float(np.median(np.diff(stretch.time)))
                 else:

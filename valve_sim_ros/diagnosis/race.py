@@ -27,8 +27,8 @@ MOST_STARTS, FEWER_STARTS = 24, 8
 so many of the best."""
 SCREENED, FINISHERS, REFINED = 3, 5, 2
 """How many starts of a candidate are followed, runners refitted, and refined to the end."""
-VALLEYS = 30
-"""For how many generations each start is followed where a fit has many valleys."""
+GENERATIONS = 30
+"""For how long each start is followed by an evolution where a fit has many valleys."""
 SPOTLESS, FAR_AHEAD, BEHIND = 0.1, 0.2, 0.5
 """Where the best leaves no more than this excess, or this part of the cost, runners short of more
 than a part of its gain are not followed."""
@@ -173,7 +173,7 @@ def _screened(
 
     found = best(problem, SCREENED)
     if CATALOGUE[candidate.effect].rugged:
-        found += [fitter.evolve(each, way, VALLEYS) for each in best(way, SCREENED)]
+        found += [fitter.evolve(each, way, GENERATIONS) for each in best(way, SCREENED)]
     elif way != problem:
         found += [fitter.fit(each, way, SHORT) for each in best(way, 1)]
     steps = SHORT if group.has_stem else LONG
