@@ -319,7 +319,12 @@ def test_data_show_where_a_signal_begins_and_what_holds_the_stem():
     bench = Bench([record])
     assert bench.stretches[0].first['x'] == pytest.approx(0.0, abs=0.2)
     results = bench.run(complete({**VALUES, 'p1_0': 0.0, 'p2_0': 0.0, 'x_0': 0.0}))
-    assert bench.friction_seen(results) == pytest.approx(VALUES['f_s'], rel=0.25)
+    friction, _ = bench.friction_seen(results)
+    assert friction == pytest.approx(VALUES['f_s'], rel=0.25)
+    off = Bench([Recording(record.time, record.u, record.p1, record.p2, 0.9 * record.x + 4.0)])
+    (_, zero), (_, span) = off.calibration_seen(results).values()
+    assert span == pytest.approx(0.9, abs=0.03)
+    assert zero == pytest.approx(4.0, abs=1.5)
 
 
 @pytest.mark.parametrize('colour', [0.0, 0.5, 0.75])

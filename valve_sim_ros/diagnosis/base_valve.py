@@ -60,7 +60,7 @@ def find_base(
         name = 'f_s'
         if group.stages == ('p2-x',):
             name = 'f_d/f_s'
-            seen = fitter.bench.friction_seen(fitter.results(valve))
+            seen, _ = fitter.bench.friction_seen(fitter.results(valve))
             around = friction_grid(seen)
             starts += [{**valve.values, **there, **stem} for there in around for stem in STEMS]
         levels = dict.fromkeys(start[name] for start in starts)

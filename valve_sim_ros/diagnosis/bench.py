@@ -48,6 +48,8 @@ CREEPS = 3.0
 """A stem that drifts by more before it has surely moved moves when the record begins [noise]."""
 APART = 6.0
 """A stem is caught where it is further than this from where it should rest [noise]."""
+SPANS = tuple(np.geomspace(0.7, 1.4, 50).tolist())
+"""Spans of the sensor that are tried."""
 LEAST_RESTS = 20
 """Samples at rest that show what holds the stem."""
 
@@ -206,20 +208,31 @@ class Bench:
         slope = np.maximum(slope - 2.0 * noise, 0.0)
         return np.sqrt(noise**2 + (self.jitter * slope) ** 2)
 
-    def friction_seen(self, results: Sequence[Array]) -> float:
-        """Return what holds the stem: half the range of p2 - x at rest [% of span].
+    def friction_seen(self, results: Sequence[Array], span: float = 1.0) -> tuple[float, float]:
+        """Return what holds the stem: half the range of p2 - x / span at rest, and its middle.
 
-        `results` are p1, p2, x of a valve by stretch, shape (4, n); NaN if x does not rest.
+        `results` are p1, p2, x of a valve by stretch, shape (4, n); NaN if x does not rest
+        [% of span].
         """
-        each = [
-            r[1] - s.rests for s, r in zip(self.stretches, results, strict=True) if s.rests.size
-        ]
+        pairs = zip(self.stretches, results, strict=True)
+        each = [result[1] - s.rests / span for s, result in pairs if s.rests.size]
         held = np.concatenate([*each, np.empty(0)])
         held = held[np.isfinite(held)]
         if held.size < LEAST_RESTS:
-            return math.nan
+            return math.nan, math.nan
         low, high = np.quantile(held, (0.005, 0.995))
-        return float(high - low) / 2.0
+        return float(high - low) / 2.0, float(high + low) / 2.0
+
+    def calibration_seen(self, results: Sequence[Array]) -> dict[str, tuple[float, ...]]:
+        """Return the zero and span of the sensor with which the same holds the stem everywhere.
+
+        `results` as for `friction_seen`; zeros [% of span] and spans, a right sensor's first, none
+        if x does not rest.
+        """
+        _, middle, span = min((*self.friction_seen(results, span), span) for span in SPANS)
+        if math.isnan(middle):
+            return {}
+        return {'zeros': (0.0, -span * middle), 'spans': (1.0, span)}
 
     def mixed_arrivals(self, results: Sequence[Array]) -> bool:
         """Tell whether some samples of p1 show a command and others not yet, as if by chance.

@@ -13,13 +13,14 @@ from ..model.spec import ValveSpec
 from ..recordings import read_recording
 from ..recordings.recording import OUTPUTS, Recording
 from . import odds
+from .adequacy import leftover
 from .base_valve import find_base, starting_valve
 from .bench import Bench
 from .conditions import Place, places
 from .errors import DiagnosisError
-from .fitting import Fitter, Valve
+from .fitting import Fitter, GENERATIONS, NARROW, Valve
 from .intervals import intervals
-from .ladder import climb, concluded, Ladder
+from .ladder import climb, concluded, excused, Ladder
 from .proof import prove
 from .result import Diagnosis, Named
 from .stages import Candidate, Group, groups
@@ -91,8 +92,6 @@ def diagnose(
         ) from None
     ladders, base = _climb_all(fitter, parts, valve, without, tell, stops)
     tell = _heedless(tell)
-    tell(0.88, 'refitting the base valve')
-    base = _plain(fitter, parts, ladders, base)
     augmented = ladders[-1].valve
     tell(0.92, 'holding out')
     floors = {ladder.group.signal: ladder.after.floor for ladder in ladders}
@@ -194,10 +193,16 @@ def _climb_all(
     tell: Progress,
     stops: tuple[type[BaseException], ...],
 ) -> tuple[list[Ladder], Valve]:
-    """Climb the ladder of each group in the order of the flow; once stopped, only look at them."""
+    """Climb the ladder of each group in the order of the flow; once stopped, only look at them.
+
+    Also returned is the base valve, fitted to all signals without any effect that was added.
+    """
     ladders: list[Ladder] = []
     base = valve
     for index, group in enumerate(parts):
+        added = any(ladder.rungs for ladder in ladders)
+        if added:
+            base = _refitted(fitter, group, base)
         share, width = 0.1 + 0.78 * index / len(parts), 0.78 / len(parts)
         text = f'looking at {group.signal}'
         known = {*without, *valve.effects}
@@ -223,6 +228,9 @@ def _climb_all(
         )
         fitter.drive = drive
         ladder = concluded(ladder)
+        if added and not _carried(ladders):
+            plain = leftover(fitter.residuals(base, group.signal, ()))
+            ladder = excused(ladder, plain)
         unexplained = ladder.outcome == 'unknown_effect' and ladder.complete
         if unexplained and candidates and group.has_stem:
             again = _within(tell, share + width, 0.0, f'{text} again')
@@ -231,6 +239,10 @@ def _climb_all(
             tell = _stop
         ladders.append(ladder)
         valve = ladder.valve
+        if not added:
+            names = [unknown.name for unknown in fitter.unknowns(group)]
+            found = {name: ladder.base.values[name] for name in names}
+            base = replace(base, values={**base.values, **found})
         inexact = group.signal == 'p1' and ladder.after.excess > odds.CLEAN
         if ladder.outcome == 'unknown_effect' or inexact:
             # what is wrong here must not be blamed on the stages that follow; a stem that is
@@ -288,20 +300,13 @@ def _within(tell: Progress, start: float, width: float, text: str) -> Callable[[
     return lambda done: tell(start + width * done, text)
 
 
-def _plain(
-    fitter: Fitter, parts: Sequence[Group], ladders: Sequence[Ladder], base: Valve
-) -> Valve:
-    """Return the base valve fitted to all signals without any effect that was added."""
-    added = False
-    for group, ladder in zip(parts, ladders, strict=True):
-        if added:
-            base = find_base(fitter, group, base, ())
-        else:
-            names = [unknown.name for unknown in fitter.unknowns(group)]
-            found = {name: ladder.base.values[name] for name in names}
-            base = replace(base, values={**base.values, **found})
-        added = added or bool(ladder.rungs)
-    return base
+def _refitted(fitter: Fitter, group: Group, valve: Valve) -> Valve:
+    """Return a valve refitted in one group behind stages that lack an effect."""
+    valve = find_base(fitter, group, valve, (), roughly=True)
+    problem = (fitter.unknowns(group), group.signal, ())
+    if group.has_stem:
+        valve = fitter.evolve(valve, problem, GENERATIONS, NARROW)
+    return fitter.fit(valve, problem)
 
 
 def _named(fitter: Fitter, ladders: Sequence[Ladder]) -> tuple[Named, ...]:

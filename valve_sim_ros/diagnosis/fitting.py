@@ -9,6 +9,7 @@ import math
 import numpy as np
 
 from ..model.pipeline import Array
+from .adequacy import leftover
 from .bench import Bench
 from .descent import descend, walk
 from .evolution import evolve
@@ -24,6 +25,8 @@ SPREAD, NARROW, FINE = 5.0, 3.0, 1.0
 """Standard deviation with which an evolution begins, near an optimum, and where a train of slips
 hangs on every step [steps of unknowns]."""
 POPULATION = 14
+FAINT = 0.02
+"""Excess up to which a train of slips is right."""
 GENERATIONS, MOST_TURNS = 40, 3
 """Generations of an evolution that refines a valve, and most evolutions in turn."""
 
@@ -151,8 +154,10 @@ class Fitter:
         valve = self.fit(valve, problem)
         if 'f_s' not in (unknown.name for unknown in problem[0]):
             return valve
+        _, signal, drive = problem
         there = valve
-        for way in eased(problem):
+        strayed = leftover(self.residuals(valve, signal, drive)).excess > FAINT
+        for way in eased(problem) if strayed else ():
             spread = FINE if way == problem else NARROW
             there = self.fit(self.evolve(there, way, GENERATIONS, spread), way)
         valve = min(valve, there, key=by_cost)

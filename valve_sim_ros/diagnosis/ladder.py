@@ -132,7 +132,7 @@ def climb(
         if carried and left.excess <= carried:
             return False
         if rungs:
-            return left.excess > odds.CLEAN
+            return odds.unfinished(left)
         return odds.suspicious(left, group.signal, fitter.bench.mixed)
 
     now, before = base, base_left = seen(valve)
@@ -200,7 +200,7 @@ def deepened(
 
 
 def reconsidered(fitter: Fitter, group: Group, base: Valve, rungs: Sequence[Rung]) -> list[Rung]:
-    """Return the rungs with the first name chosen anew beside the second.
+    """Return the rungs with the first name chosen anew beside the second, or none if that does.
 
     Alone, an effect may have been named because it made up for part of another one.
     """
@@ -224,7 +224,10 @@ def reconsidered(fitter: Fitter, group: Group, base: Valve, rungs: Sequence[Rung
     before = leftover(fitter.residuals(alone, group.signal))
     found = judged(fitter, group, alone, before, race(fitter, group, alone, candidates))
     if found is None:
-        return list(rungs)
+        gained = 0.5 * (alone.cost - second.valve.cost) / second.after.inflation
+        both = sorted((alone, first.valve), key=by_cost)
+        only = judged(fitter, group, base, first.before, both) if gained < odds.ENOUGH else None
+        return [only] if only else list(rungs)
     worse = 0.5 * (found.valve.cost - second.valve.cost) / found.after.inflation
     if worse > odds.twin_limit(found.gains[found.effect]):
         return list(rungs)
@@ -276,10 +279,22 @@ def concluded(ladder: Ladder) -> Ladder:
     """Return the ladder with its outcome: names only if together they explain the gap."""
     closed = ladder.before.closed_by(ladder.after)
     clean = ladder.after.excess <= odds.CLEAN and closed >= odds.LEAST_CLOSED
-    if ladder.rungs and (closed >= odds.EXPLAINED or clean):
+    least = odds.EXPLAINED if len(ladder.rungs) == 1 else odds.EXPLAINED_BY_TWO
+    if ladder.rungs and (closed >= least or clean):
         return replace(ladder, outcome='missing_effect')
     # what does not explain the gap is not left in the valve either
     plain = replace(ladder, valve=ladder.base, after=ladder.before, rungs=())
     if ladder.before.excess > odds.ADEQUATE[ladder.group.signal]:
         return replace(plain, outcome='unknown_effect')
     return plain
+
+
+def excused(ladder: Ladder, plain: Leftover) -> Ladder:
+    """Return the ladder of a group behind one with an effect, not unknown if that explains most.
+
+    Its law is never quite right, and slips tell. `plain` is what the valve without it leaves.
+    """
+    explained = plain.closed_by(ladder.before) >= odds.EXPLAINED
+    if ladder.outcome == 'unknown_effect' and explained:
+        return replace(ladder, outcome='adequate')
+    return ladder

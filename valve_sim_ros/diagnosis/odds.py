@@ -15,8 +15,12 @@ ENOUGH = 25.0
 MORE_ENOUGH, MORE_EXCESS, MORE_CLOSED = 60.0, 0.25, 0.6
 """What a further effect needs: gain, excess before it, and the part of it that it closes."""
 MORE_SHARE, FAR_OFF = 0.02, 2.0
-"""Least part of the whole gap that it closes; the excess from which it may close less of what is
-left, if both together explain the gap."""
+"""Least part of the whole gap that it closes, unless it leaves nothing but noise; the excess from
+which it may close less of what is left, if both together explain the gap."""
+MORE_FAR = 10
+"""So many errors beyond any noise are as good a reason to look for it as an excess."""
+SPOTLESS = 0.1
+"""Excess that is nothing but noise."""
 NEGLIGIBLE = 1.0 / 3.0
 """An effect of less than this part of its least usual size is another run of the base valve."""
 LASTING = (
@@ -46,6 +50,8 @@ CLEAN = 0.25
 EXPLAINED, LEAST_CLOSED = 0.85, 0.5
 """Least part of the excess that a name must close, else the effect is unknown; and where nothing
 but noise is left."""
+EXPLAINED_BY_TWO = 0.97
+"""The same where two effects close it: two that are wrong imitate more than one."""
 LEAST_FIRST = 0.1
 """A first effect that closes less than this part of the excess is not followed by a second."""
 TWIN_GAIN, TWIN_SHARE, KNOWN_TWIN_SHARE = 12.0, 0.003, 0.02
@@ -106,9 +112,14 @@ def size(valve: Valve) -> float:
     return max(sizes, default=1.0)
 
 
+def unfinished(left: Leftover) -> bool:
+    """Tell whether what the effects found so far leave makes it worth to look for another."""
+    return left.excess >= MORE_EXCESS or left.far >= MORE_FAR
+
+
 def further(gained: float, before: Leftover) -> bool:
     """Tell whether there is evidence for one effect more than those already found."""
-    return gained >= MORE_ENOUGH and before.excess >= MORE_EXCESS
+    return gained >= MORE_ENOUGH and unfinished(before)
 
 
 def needed(base: Leftover, before: Leftover, closed: float, after: Leftover) -> bool:
@@ -116,7 +127,8 @@ def needed(base: Leftover, before: Leftover, closed: float, after: Leftover) -> 
     share = base.closed_by(after) - base.closed_by(before)
     left = base.closed_by(before) < EXPLAINED or before.excess > FAR_OFF
     explained = left and base.closed_by(after) >= EXPLAINED
-    return share >= MORE_SHARE and (closed >= MORE_CLOSED or explained)
+    matters = share >= MORE_SHARE or after.excess <= SPOTLESS
+    return matters and (closed >= MORE_CLOSED or explained)
 
 
 def look_alike(one: str, other: str) -> bool:

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The race: each candidate effect is refitted together with the base valve of its group."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from functools import partial
@@ -29,9 +29,11 @@ SCREENED, FINISHERS, REFINED = 3, 5, 2
 """How many starts of a candidate are followed, runners refitted, and refined to the end."""
 GENERATIONS = 30
 """For how long each start is followed by an evolution where a fit has many valleys."""
-SPOTLESS, FAR_AHEAD, BEHIND = 0.1, 0.2, 0.5
-"""Where the best leaves no more than this excess, or this part of the cost, runners short of more
-than a part of its gain are not followed."""
+FAR_AHEAD, BEHIND = 0.2, 0.5
+"""Where the best leaves no more than this part of the cost, or nothing but noise, runners short of
+more than a part of its gain are not followed."""
+FAINT = 0.02
+"""Laborious effects never leave less excess than this in a base valve."""
 
 Frictions = Sequence[dict[str, float]]
 
@@ -50,8 +52,12 @@ def race(
         results = fitter.results(valve)
         # whole slips would hide a swing
         residual = fitter.residuals(valve, group.signal, (*fitter.drive, RESTS))
-        seen = {'swings': _swings(fitter, residual), 'steps': fitter.bench.steps_of_x}
-        frictions = friction_grid(fitter.bench.friction_seen(results))
+        seen = {
+            'swings': _swings(fitter, residual),
+            'steps': fitter.bench.steps_of_x,
+            **fitter.bench.calibration_seen(results),
+        }
+        frictions = friction_grid(fitter.bench.friction_seen(results)[0])
     done = 0
 
     def count(runner: Valve) -> Valve:
@@ -79,7 +85,7 @@ def race(
     def within(runners: Sequence[Valve], most: int) -> int:
         """Return how many are to be followed: none far behind one that explains nearly all."""
         best = runners[0]
-        far_ahead = best.cost < FAR_AHEAD * valve.cost or excess(best) <= SPOTLESS
+        far_ahead = best.cost < FAR_AHEAD * valve.cost or excess(best) <= odds.SPOTLESS
         return len(in_reach(valve, runners[:most])) if far_ahead else most
 
     def beside(best: Valve, runner: Valve) -> Valve:
@@ -92,33 +98,44 @@ def race(
 
     with ThreadPoolExecutor(os.cpu_count()) as pool:  # compiled runs release the lock
 
-        def followed(how: Callable[..., Valve], runners: list[Valve], most: int) -> list[Valve]:
-            """Return the runners, the best of them taken further, in their new order."""
+        def followed(
+            how: Callable[..., Valve],
+            runners: list[Valve],
+            most: int,
+            done: Collection[Valve] = (),
+        ) -> list[Valve]:
+            """Return the runners, the best but those `done` taken further, in their new order."""
             progress(1.0)
             most = within(runners, most)
-            return sorted([*pool.map(how, runners[:most]), *runners[most:]], key=by_cost)
+            ahead = [each for each in runners[:most] if each not in done]
+            others = [each for each in runners if each not in ahead]
+            return sorted([*pool.map(how, ahead), *others], key=by_cost)
 
         def heat(ahead: list[Valve], some: Sequence[Candidate]) -> list[Valve]:
-            """Return the runners with some more, which evolve while they are among the best."""
+            """Return the runners with some more, which are refitted as far as they lead."""
+            if not some:
+                return ahead
             fresh = sorted(map(count, pool.map(screened, some)), key=by_cost)
-            for left, generations in ROUNDS if group.has_stem and fresh else ():
+            for left, generations in ROUNDS if group.has_stem else ():
                 last = sorted(each.cost for each in (*ahead, *fresh))[:left][-1]
                 among = sum(each.cost <= last for each in fresh)
                 if among:
                     fresh = followed(partial(evolved, generations=generations), fresh, among)
-            return sorted([*ahead, *fresh], key=by_cost)
+            runners = followed(fitted, sorted([*ahead, *fresh], key=by_cost), FINISHERS, ahead)
+            if not group.has_stem:
+                return runners
+            near = sum(excess(each) <= odds.CLEAN for each in runners[:REFINED])
+            return followed(refined, runners, near or REFINED, ahead)
 
         laborious = [each for each in candidates if CATALOGUE[each.effect].laborious]
         runners = heat([], [each for each in candidates if each not in laborious])
         best = runners[0] if runners else valve
-        if best.cost < FAR_AHEAD * valve.cost and excess(best) <= SPOTLESS:
+        if best.cost < FAR_AHEAD * valve.cost and excess(best) <= odds.SPOTLESS:
             effect = best.candidates[-1].effect
             laborious = [each for each in laborious if odds.look_alike(effect, each.effect)]
+        elif runners and excess(valve) < FAINT:
+            laborious = []
         runners = heat(runners, laborious)
-        runners = followed(fitted, runners, FINISHERS)
-        if not group.has_stem:
-            return runners
-        runners = followed(refined, runners, REFINED)
         return sorted(pool.map(partial(beside, runners[0]), runners), key=by_cost)
 
 

@@ -30,6 +30,7 @@ EFFECT = Effect(
             'linear',
             'Measured x where it should be 0',
             starts=(-3.0, 0.0, 3.0),
+            shown='zeros',
             usual=(0.4, 5.5),
         ),
         EffectParameter(
@@ -43,6 +44,7 @@ EFFECT = Effect(
             'Change of measured per true x',
             neutral=1.0,
             starts=(0.9, 1.0, 1.1),
+            shown='spans',
             usual=(0.008, 0.16),
         ),
     ),
