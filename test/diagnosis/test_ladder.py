@@ -1,0 +1,105 @@
+# Copyright 2026 The valve_sim_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The rules by which effects are kept, exchanged and called unknown."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from valve_sim_ros import simulate
+from valve_sim_ros.diagnosis import race as racing
+from valve_sim_ros.diagnosis.adequacy import Leftover, leftover
+from valve_sim_ros.diagnosis.base_valve import starting_valve
+from valve_sim_ros.diagnosis.bench import Bench
+from valve_sim_ros.diagnosis.fitting import by_cost, Fitter
+from valve_sim_ros.diagnosis.ladder import concluded, excused, judged, Ladder, reconsidered, Rung
+from valve_sim_ros.diagnosis.race import race
+from valve_sim_ros.diagnosis.stages import groups
+from valve_sim_ros.recordings.recording import Recording
+
+STEM = groups(('p1', 'p2', 'x'))[-1]
+
+
+STAGES = {'f_d1': 0.5, 'T_g1': 2.0, 'T_g2': 5.0}
+
+
+def left(excess):
+    return Leftover(1.0 + excess, 1.0 + excess, 1.0, 5000, 1.0)
+
+
+def ladder_of(outcome, before, after, *names):
+    valve = starting_valve(Bench([measured()]))
+    rungs = [Rung(n, 'p2-x', {n: 1e3}, before, after, 1.0, 0.9, (), valve) for n in names]
+    return Ladder(STEM, outcome, valve, valve, before, after, tuple(rungs))
+
+
+def measured(**effects):
+    levels = np.random.default_rng(5).uniform(10.0, 90.0, 30)
+    u = np.concatenate([np.zeros(20), np.repeat(levels, 50)])
+    used = list({name.split('.')[0] for name in effects})
+    s = simulate(u, parameters={**STAGES, 'f_s': 4.0, 'f_d': 2.4, 'effects': used, **effects})
+    rng = np.random.default_rng(1)
+    noisy = [each + 0.2 * rng.standard_normal(u.size) for each in (s.p1, s.p2, s.x)]
+    return Recording(s.t, u, *noisy)
+
+
+def fitted(record):
+    """Return a fitter, and the base valve fitted to the stem alone."""
+    fitter = Fitter(Bench([record]))
+    start = starting_valve(fitter.bench)
+    start = replace(start, values={**start.values, **STAGES})
+    return fitter, fitter.fit(start, fitter.problem(STEM, start))
+
+
+@pytest.mark.parametrize(
+    ('names', 'after', 'outcome'),
+    [
+        (('travel_stops',), 5.0, 'missing_effect'),
+        (('travel_stops', 'vibration'), 5.0, 'unknown_effect'),
+        (('travel_stops', 'vibration'), 1.0, 'missing_effect'),
+        (('travel_stops',), 20.0, 'unknown_effect'),
+    ],
+)
+def test_two_effects_must_explain_more_than_one(names, after, outcome):
+    assert concluded(ladder_of('adequate', left(50.0), left(after), *names)).outcome == outcome
+
+
+def test_what_an_effect_named_before_explains_is_not_unknown():
+    unknown = ladder_of('unknown_effect', left(1.0), left(1.0))
+    assert excused(unknown, left(20.0)).outcome == 'adequate'
+    assert excused(unknown, left(2.0)).outcome == 'unknown_effect'
+
+
+def test_a_first_effect_that_the_second_makes_needless_is_dropped():
+    parameters = {'sensor_calibration.zero': -3.5, 'sensor_calibration.span': 0.94}
+    fitter, base = fitted(measured(**parameters))
+    chosen = {c.effect: c for c in STEM.candidates() if c.names != ('hardening',)}
+    wrong, right = chosen['spring_nonlinearity'], chosen['sensor_calibration']
+
+    def with_effect(valve, candidate):
+        before = leftover(fitter.residuals(valve, 'x'))
+        (found, *_) = race(fitter, STEM, valve, [candidate])
+        return judged(fitter, STEM, valve, before, [found])
+
+    first = with_effect(base, wrong)
+    second = with_effect(first.valve, right)
+    rungs = reconsidered(fitter, STEM, base, [first, second])
+    assert [rung.effect for rung in rungs] == ['sensor_calibration']
+    assert rungs[0].after.excess < 0.05
+
+
+def test_a_laborious_effect_does_not_run_where_another_explains_the_signal(monkeypatch):
+    fitter, base = fitted(measured(**{'travel_stops.upper': 60.0}))
+    screened = racing._screened
+    tried = []
+
+    def noted(fitter, candidate, *more):
+        tried.append(candidate.effect)
+        return screened(fitter, candidate, *more)
+
+    monkeypatch.setattr(racing, '_screened', noted)
+    some = [c for c in STEM.candidates() if c.effect in ('travel_stops', 'stribeck_friction')]
+    found = race(fitter, STEM, base, some)
+    assert found == sorted(found, key=by_cost)
+    assert set(tried) == {'travel_stops'}
