@@ -271,6 +271,18 @@ def test_single_steps_of_the_command_show_whether_arrivals_are_mixed():
         assert bench.mixed_arrivals(wrong) == mixed
 
 
+def test_a_command_that_always_moves_shows_it_too_and_no_lag_passes_for_chance():
+    rng = np.random.default_rng(8)
+    u = 50.0 + 40.0 * np.sin(np.arange(3000) / 30.0)
+    noise = 0.1 * rng.standard_normal(3000)
+    last = np.roll(u, 1)
+    some = np.where(rng.random(3000) < 0.3, last, u)
+    lagging = lfilter([0.5], [1.0, -0.5], u - u[0]) + u[0]
+    for p1, mixed in ((u, False), (some, True), (last, False), (lagging, False)):
+        bench = Bench([Recording(0.2 * np.arange(3000), u, p1 + noise)])
+        assert bench.mixed_arrivals([np.tile(u, (4, 1))]) == mixed
+
+
 @pytest.mark.parametrize('signals', [('p1', 'p2'), ('p2',)])
 def test_steps_that_came_before_the_sample_are_told_by_what_follows(signals):
     u = commands(3000)
@@ -458,3 +470,13 @@ def test_one_of_several_recordings_may_have_lost_x():
     for drive in ((), (CAUGHT,), (HELD,)):
         assert np.isfinite(bench.score(right, (), 'p1', drive))
     assert bench.score(right, (), 'x') == pytest.approx(Bench([record]).score(right, (), 'x'))
+
+
+@pytest.mark.parametrize('effect', CATALOGUE)
+def test_a_fit_may_reach_the_valve_without_the_effect(effect):
+    bench = Bench([recording()])
+    values = complete({**VALUES, 'p1_0': 0.0, 'p2_0': 0.0, 'x_0': 0.0})
+    neutral = {f'{effect}.{p.name}': p.neutral for p in CATALOGUE[effect].parameters}
+    (plain,) = bench.run(values)
+    (with_it,) = bench.run({**values, **neutral}, (effect,))
+    assert np.quantile(np.abs(with_it[2] - plain[2]), 0.99) < 0.02

@@ -34,8 +34,13 @@ JITTER = 0.1
 """Uncertainty of when a sample was taken, as a share of the period."""
 ENOUGH_STEPS, LEAST_EACH = 6, 2
 """From so many single steps of the command on, so many late and on time tell of mixed arrivals."""
-MIXED, LEAST_MIXED, MIXED_JITTER = 0.02, 3, 0.7
-"""Else this share and number of samples does; and the uncertainty of the time of a sample then."""
+TOLD, ALIKE, LEAST_PAIRS = 3.0, 0.2, 40
+"""Else pairs of moves of p1 tell, each larger than this from sample to sample [noise], and alike."""
+WITHIN, BY_CHANCE = 0.9, 0.05
+"""Least part of such moves of which all or a part may be missing, but no more; and the share of
+their square that scatters: 5 in 100 late come to it."""
+MIXED_JITTER = 0.7
+"""Uncertainty of the time of a sample then."""
 LEAST_AT_REST = 0.3
 """Share of the samples of p1 that counts even so."""
 TRAVEL, MOST_UNSETTLED = 8.0, 0.1
@@ -251,13 +256,23 @@ class Bench:
         late, on_time = map(sum, zip(*each, strict=True))
         if late + on_time >= ENOUGH_STEPS:
             return min(late, on_time) >= LEAST_EACH
+        scatter = moves = 0.0
+        pairs = within = 0
         for stretch, result in zip(self.stretches, results, strict=True):
-            now, before = result[0, 1:], result[0, :-1]
-            seen = stretch.counts['p1'][1:]
-            told = self._steps(result)[1:] > 8.0 * noise
-            late += int(np.sum(told & (np.abs(seen - before) < 3.0 * noise)))
-            on_time += int(np.sum(told & (np.abs(seen - now) < 3.0 * noise)))
-        return min(late, on_time) >= max(MIXED * (late + on_time), LEAST_MIXED)
+            # a lag or a wrong level changes little from one step to a like one, chance does
+            step = np.diff(result[0])
+            late = result[0, 1:] - stretch.counts['p1'][1:]
+            change, square = np.diff(late) ** 2, step[1:] ** 2 + step[:-1] ** 2
+            alike = (step[1:] - step[:-1]) ** 2 < ALIKE * square
+            told = alike & (np.minimum(*np.abs((step[1:], step[:-1]))) > TOLD * noise)
+            told &= np.isfinite(change)
+            scatter += float(np.sum(change[told] - 2.0 * noise**2))
+            moves += float(np.sum(square[told]))
+            pairs += int(told.sum())
+            beyond = np.maximum(-late * np.sign(step), np.abs(late) - np.abs(step)) > TOLD * noise
+            within += int(np.sum(told & ~beyond[1:]))
+        enough = pairs >= LEAST_PAIRS and within > WITHIN * pairs
+        return enough and scatter > BY_CHANCE * moves
 
     def weigh_down(self, jitter: float, results: Sequence[Array]) -> None:
         """Let sample times be uncertain by this share of a period.

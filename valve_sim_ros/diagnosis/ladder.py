@@ -200,7 +200,7 @@ def deepened(
 
 
 def reconsidered(fitter: Fitter, group: Group, base: Valve, rungs: Sequence[Rung]) -> list[Rung]:
-    """Return the rungs with the first name chosen anew beside the second, or none if that does.
+    """Return the rungs with the first name chosen anew beside the second, or one if that does.
 
     Alone, an effect may have been named because it made up for part of another one.
     """
@@ -212,27 +212,40 @@ def reconsidered(fitter: Fitter, group: Group, base: Valve, rungs: Sequence[Rung
         for candidate in group.candidates({*base.effects, second.effect})
         if candidate.effect in near
     ]
-    own = first.valve.candidates[-1]
-    without = replace(
-        second.valve,
-        values={**second.valve.values, **own.neutral},
-        effects=tuple(name for name in second.valve.effects if name != first.effect),
-        freed=(*base.freed, *added.unknowns),
-        candidates=(*base.candidates, added),
-    )
-    alone = fitter.fit(without, fitter.problem(group, without))
-    before = leftover(fitter.residuals(alone, group.signal))
-    found = judged(fitter, group, alone, before, race(fitter, group, alone, candidates))
+
+    def alone(both: Valve, one: Candidate, other: Candidate) -> Valve:
+        """Return the valve with only one of two effects."""
+        valve = replace(
+            both,
+            values={**both.values, **other.neutral},
+            effects=tuple(name for name in both.effects if name != other.effect),
+            freed=(*base.freed, *one.unknowns),
+            candidates=(*base.candidates, one),
+        )
+        return fitter.fit(valve, fitter.problem(group, valve))
+
+    def enough(both: Rung, only: Valve) -> list[Rung]:
+        """Return the step to one effect if two are hardly better."""
+        if 0.5 * (only.cost - both.valve.cost) / both.after.inflation >= odds.ENOUGH:
+            return []
+        runners = sorted((only, first.valve), key=by_cost)
+        found = judged(fitter, group, base, first.before, runners)
+        return [found] if found else []
+
+    later = alone(second.valve, added, first.valve.candidates[-1])
+    if only := enough(second, later):
+        return only
+    before = leftover(fitter.residuals(later, group.signal))
+    found = judged(fitter, group, later, before, race(fitter, group, later, candidates))
     if found is None:
-        gained = 0.5 * (alone.cost - second.valve.cost) / second.after.inflation
-        both = sorted((alone, first.valve), key=by_cost)
-        only = judged(fitter, group, base, first.before, both) if gained < odds.ENOUGH else None
-        return [only] if only else list(rungs)
+        return list(rungs)
     worse = 0.5 * (found.valve.cost - second.valve.cost) / found.after.inflation
     if worse > odds.twin_limit(found.gains[found.effect]):
         return list(rungs)
     if found.effect == first.effect and worse > 0.0:
         found = replace(found, valve=second.valve, after=second.after)
+    elif only := enough(found, alone(found.valve, found.valve.candidates[-1], added)):
+        return only
     return [found, replace(second, after=found.after, valve=found.valve)]
 
 

@@ -13,10 +13,11 @@ from ..memory import lagged
 
 @njit
 def sensor(value: float, state: Any, p: Any, memory: Any, dt: float) -> float:
-    """Return x behind a lag, driven by the mean of x over the step."""
+    """Return x behind a lag; exact where x moves evenly during the step."""
     if math.isnan(memory[0]):
         memory[0] = memory[1] = value
-    memory[0] = lagged(memory[0], 0.5 * (memory[1] + value), p[0], dt)
+    lag = (value - memory[1]) * p[0] / dt if dt > 0.0 else 0.0
+    memory[0] = lagged(memory[0] - memory[1] + lag, 0.0, p[0], dt) + value - lag
     memory[1] = value
     return memory[0]
 
