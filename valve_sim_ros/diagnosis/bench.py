@@ -35,7 +35,7 @@ JITTER = 0.1
 ENOUGH_STEPS, LEAST_EACH = 6, 2
 """From so many single steps of the command on, so many late and on time tell of mixed arrivals."""
 TOLD, ALIKE, LEAST_PAIRS = 3.0, 0.2, 40
-"""Else pairs of moves of p1 tell, each larger than this from sample to sample [noise], and alike."""
+"""Else pairs of moves of p1 from sample to sample tell, larger than this [noise] and alike."""
 WITHIN, BY_CHANCE = 0.9, 0.05
 """Least part of such moves of which all or a part may be missing, but no more; and the share of
 their square that scatters: 5 in 100 late come to it."""
