@@ -261,16 +261,17 @@ class Bench:
         for stretch, result in zip(self.stretches, results, strict=True):
             # a lag or a wrong level changes little from one step to a like one, chance does
             step = np.diff(result[0])
-            late = result[0, 1:] - stretch.counts['p1'][1:]
-            change, square = np.diff(late) ** 2, step[1:] ** 2 + step[:-1] ** 2
+            missing = result[0, 1:] - stretch.counts['p1'][1:]
+            change, square = np.diff(missing) ** 2, step[1:] ** 2 + step[:-1] ** 2
             alike = (step[1:] - step[:-1]) ** 2 < ALIKE * square
             told = alike & (np.minimum(*np.abs((step[1:], step[:-1]))) > TOLD * noise)
             told &= np.isfinite(change)
             scatter += float(np.sum(change[told] - 2.0 * noise**2))
             moves += float(np.sum(square[told]))
             pairs += int(told.sum())
-            beyond = np.maximum(-late * np.sign(step), np.abs(late) - np.abs(step)) > TOLD * noise
-            within += int(np.sum(told & ~beyond[1:]))
+            part = missing * np.sign(step)
+            inside = np.maximum(-part, part - np.abs(step)) <= TOLD * noise
+            within += int(np.sum(told & inside[1:]))
         enough = pairs >= LEAST_PAIRS and within > WITHIN * pairs
         return enough and scatter > BY_CHANCE * moves
 
