@@ -202,7 +202,10 @@ def _climb_all(
     for index, group in enumerate(parts):
         added = any(ladder.rungs for ladder in ladders)
         if added:
-            base = _refitted(fitter, group, base)
+            try:
+                base = _refitted(fitter, group, base)
+            except stops:
+                tell = _stop
         share, width = 0.1 + 0.78 * index / len(parts), 0.78 / len(parts)
         text = f'looking at {group.signal}'
         known = {*without, *valve.effects}

@@ -26,7 +26,7 @@ SPREAD, NARROW, FINE = 5.0, 3.0, 1.0
 hangs on every step [steps of unknowns]."""
 POPULATION = 14
 FAINT = 0.02
-"""Excess up to which a train of slips is right."""
+"""Excess up to which a train of slips is right; laborious effects leave more in a base valve."""
 GENERATIONS, MOST_TURNS = 40, 3
 """Generations of an evolution that refines a valve, and most evolutions in turn."""
 

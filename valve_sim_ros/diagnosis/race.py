@@ -15,7 +15,7 @@ from ..model.effects import CATALOGUE
 from ..model.pipeline import Array
 from . import odds
 from .adequacy import leftover
-from .fitting import by_cost, eased, Fitter, LONG, Problem, SHORT, Valve
+from .fitting import by_cost, eased, FAINT, Fitter, LONG, Problem, SHORT, Valve
 from .stages import Candidate, Group
 from .starts import friction_grid
 from .stretch import RESTS
@@ -32,8 +32,6 @@ GENERATIONS = 30
 FAR_AHEAD, BEHIND = 0.2, 0.5
 """Where the best leaves no more than this part of the cost, or nothing but noise, runners short of
 more than a part of its gain are not followed."""
-FAINT = 0.02
-"""Laborious effects never leave less excess than this in a base valve."""
 
 Frictions = Sequence[dict[str, float]]
 
