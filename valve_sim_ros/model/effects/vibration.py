@@ -35,6 +35,7 @@ EFFECT = Effect(
             'linear',
             'Amplitude of the periodic force',
             starts=(0.7, 2.5),
+            usual=(0.5, 5.0),
         ),
         EffectParameter(
             'frequency',
