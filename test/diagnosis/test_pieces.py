@@ -386,6 +386,8 @@ def test_a_further_effect_must_close_part_of_the_whole_gap():
     assert odds.needed(base, far, 0.3, near)  # much is left, and both together explain it
     assert not odds.needed(base, near, 0.3, clean)  # enough is explained without it
     assert not odds.needed(base, near, 0.9, Leftover(1.5, 1.5, 1.0, 5000, 1.0))
+    small, noise = (Leftover(1.0 + e, 1.0 + e, 1.0, 5000, 1.0) for e in (0.4, 0.05))
+    assert odds.needed(base, small, 0.9, noise)  # little of the whole, but nothing more is left
 
 
 def test_the_place_of_a_misfit_is_found():
