@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """From recordings to a verdict: find, name, add, show."""
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 import math
@@ -12,19 +12,17 @@ from ..identification.watch import Progress, Stop
 from ..model.spec import ValveSpec
 from ..recordings import read_recording
 from ..recordings.recording import OUTPUTS, Recording
-from . import odds
-from .adequacy import leftover
 from .base_valve import find_base, starting_valve
 from .bench import Bench
+from .climbing import climb_all
 from .conditions import Place, places
 from .errors import DiagnosisError
-from .fitting import Fitter, GENERATIONS, NARROW, Valve
+from .fitting import Fitter, Valve
 from .intervals import intervals
-from .ladder import climb, concluded, excused, Ladder
+from .ladder import Ladder
 from .proof import prove
 from .result import Diagnosis, Named
-from .stages import Candidate, Group, groups
-from .stretch import CAUGHT, HELD, RESTS
+from .stages import groups
 from .unknowns import complete
 
 Data = Recording | str | os.PathLike[str]
@@ -90,7 +88,7 @@ def diagnose(
         raise DiagnosisError(
             'stopped before the base valve was fitted; let it run a little longer'
         ) from None
-    ladders, base = _climb_all(fitter, parts, valve, without, tell, stops)
+    ladders, base = climb_all(fitter, parts, valve, without, tell, stops)
     tell = _heedless(tell)
     augmented = ladders[-1].valve
     tell(0.92, 'holding out')
@@ -114,11 +112,6 @@ def diagnose(
 
 def _silent(share: float, text: str) -> None:
     """Tell nobody."""
-
-
-def _stop(share: float, text: str) -> None:
-    """Stop whatever tells how far it is."""
-    raise Stop
 
 
 def _heedless(tell: Progress) -> Progress:
@@ -183,133 +176,6 @@ def _known(valve: Valve, spec: ValveSpec | None) -> Valve:
     values['a_1/a_2'] = values['a_1'] / values['a_2']
     values['damping'] = values['a_2'] / (2.0 * math.sqrt(values['a_1']))
     return replace(valve, values={**valve.values, **values}, effects=spec.effects)
-
-
-def _climb_all(
-    fitter: Fitter,
-    parts: Sequence[Group],
-    valve: Valve,
-    without: Collection[str],
-    tell: Progress,
-    stops: tuple[type[BaseException], ...],
-) -> tuple[list[Ladder], Valve]:
-    """Climb the ladder of each group in the order of the flow; once stopped, only look at them.
-
-    Also returned is the base valve, fitted to all signals without any effect that was added.
-    """
-    ladders: list[Ladder] = []
-    base = valve
-    for index, group in enumerate(parts):
-        added = any(ladder.rungs for ladder in ladders)
-        if added:
-            try:
-                base = _refitted(fitter, group, base)
-            except stops:
-                tell = _stop
-        share, width = 0.1 + 0.78 * index / len(parts), 0.78 / len(parts)
-        text = f'looking at {group.signal}'
-        known = {*without, *valve.effects}
-        # a stem driven by a noisy p2 slips at other moments: nothing is named after such a one
-        blind = any(
-            ladder.outcome == 'unknown_effect' and ladder.group.signal == 'p2'
-            for ladder in ladders
-        )
-        candidates = () if blind else group.candidates(known)
-        drive = fitter.drive
-        if 'x' in fitter.bench.signals and not group.has_stem:
-            # the stem may act on these stages: a positioner, the chamber's volume
-            fitter.drive = (*drive, HELD)
-        ladder = climb(
-            fitter,
-            group,
-            valve,
-            candidates,
-            refit=bool(ladders),
-            carried=_carried(ladders),
-            progress=_within(tell, share, width, text),
-            stops=stops,
-        )
-        fitter.drive = drive
-        ladder = concluded(ladder)
-        if added and not _carried(ladders):
-            plain = leftover(fitter.residuals(base, group.signal, ()))
-            ladder = excused(ladder, plain)
-        unexplained = ladder.outcome == 'unknown_effect' and ladder.complete
-        if unexplained and candidates and group.has_stem:
-            again = _within(tell, share + width, 0.0, f'{text} again')
-            ladder = _second_look(fitter, group, ladder, candidates, again, stops)
-        if not ladder.complete:
-            tell = _stop
-        ladders.append(ladder)
-        valve = ladder.valve
-        if not added:
-            names = [unknown.name for unknown in fitter.unknowns(group)]
-            found = {name: ladder.base.values[name] for name in names}
-            base = replace(base, values={**base.values, **found})
-        inexact = group.signal == 'p1' and ladder.after.excess > odds.CLEAN
-        if ladder.outcome == 'unknown_effect' or inexact:
-            # what is wrong here must not be blamed on the stages that follow; a stem that is
-            # driven by a noisy p2 would slip at other moments
-            fitter.drive = (*fitter.drive, group.signal)
-    fitter.drive = ()
-    return ladders, base
-
-
-def _carried(ladders: Sequence[Ladder]) -> float:
-    """Return the most that the signals before leave, if that is more than next to nothing."""
-    left = [ladder.after.excess for ladder in ladders]
-    return max((excess for excess in left if excess > odds.CLEAN), default=0.0)
-
-
-def _second_look(
-    fitter: Fitter,
-    group: Group,
-    ladder: Ladder,
-    candidates: Sequence[Candidate],
-    progress: Callable[[float], object],
-    stops: tuple[type[BaseException], ...],
-) -> Ladder:
-    """Return what a stem shows that is put to rest where it was seen to rest, if it is named.
-
-    A stem that slips on and on is soon a whole slip off, and then hides what each slip lacks.
-    First it is only caught where it is far off; a search that strays even so is led more tightly.
-    """
-    drive, complete = fitter.drive, ladder.complete
-    for how in (CAUGHT, RESTS):
-        fitter.drive = (*drive, how)
-        found = concluded(
-            climb(
-                fitter,
-                group,
-                ladder.valve,
-                candidates,
-                refit=True,
-                progress=progress,
-                stops=stops,
-            )
-        )
-        fitter.drive = drive
-        complete = complete and found.complete
-        if found.outcome == 'missing_effect':
-            valve = fitter.refined(found.valve, fitter.problem(group, found.valve))
-            return replace(found, valve=valve, base=ladder.base)
-        if not complete:
-            break
-    return replace(ladder, complete=complete)
-
-
-def _within(tell: Progress, start: float, width: float, text: str) -> Callable[[float], object]:
-    """Return how to tell the progress of a part of the work."""
-    return lambda done: tell(start + width * done, text)
-
-
-def _refitted(fitter: Fitter, group: Group, valve: Valve) -> Valve:
-    """Return a valve refitted in one group behind stages that lack an effect."""
-    valve = find_base(fitter, group, valve, (), roughly=True)
-    problem = (fitter.unknowns(group), group.signal, ())
-    if group.has_stem:
-        valve = fitter.evolve(valve, problem, GENERATIONS, NARROW)
-    return fitter.fit(valve, problem)
 
 
 def _named(fitter: Fitter, ladders: Sequence[Ladder]) -> tuple[Named, ...]:
