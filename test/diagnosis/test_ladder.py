@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from valve_sim_ros import simulate
+from valve_sim_ros.diagnosis import diagnose
 from valve_sim_ros.diagnosis import race as racing
 from valve_sim_ros.diagnosis.adequacy import Leftover, leftover
 from valve_sim_ros.diagnosis.base_valve import starting_valve
@@ -37,7 +38,7 @@ def ladder_of(outcome, before, after, *names):
 def measured(**effects):
     levels = np.random.default_rng(5).uniform(10.0, 90.0, 30)
     u = np.concatenate([np.zeros(20), np.repeat(levels, 50)])
-    used = list({name.split('.')[0] for name in effects})
+    used = list({name.split('.')[0] for name in effects if '.' in name})
     s = simulate(u, parameters={**STAGES, 'f_s': 4.0, 'f_d': 2.4, 'effects': used, **effects})
     rng = np.random.default_rng(1)
     noisy = [each + 0.2 * rng.standard_normal(u.size) for each in (s.p1, s.p2, s.x)]
@@ -103,3 +104,12 @@ def test_a_laborious_effect_does_not_run_where_another_explains_the_signal(monke
     found = race(fitter, STEM, base, some)
     assert found == sorted(found, key=by_cost)
     assert set(tried) == {'travel_stops'}
+
+
+def test_an_effect_found_in_p1_is_not_fitted_anew_to_p2():
+    """A leak looks like a converter's span to p2, which must not undo what p1 shows."""
+    both = {'ip_calibration.span': 0.97, 'air_leak.leak_rate': 0.36}
+    record = measured(**both, T_g1=1.0, T_g2=1.2)
+    found = diagnose(record)
+    assert [each.rung.effect for each in found.effects] == ['ip_calibration', 'air_leak']
+    assert found.augmented.values['ip_calibration.span'] == pytest.approx(0.97, abs=0.01)

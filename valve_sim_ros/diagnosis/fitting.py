@@ -33,11 +33,10 @@ GENERATIONS, MOST_TURNS = 40, 3
 
 @dataclass(frozen=True)
 class Valve:
-    """A fitted valve: values of all unknowns, effects in force, what they may vary, its cost."""
+    """A fitted valve: values of all unknowns, effects in force, those added, its cost."""
 
     values: Mapping[str, float]
     effects: tuple[str, ...] = ()
-    freed: tuple[Unknown, ...] = ()
     candidates: tuple[Candidate, ...] = ()
     cost: float = math.inf
 
@@ -172,7 +171,8 @@ class Fitter:
 
     def problem(self, group: Group, valve: Valve) -> Problem:
         """Return what a refit of a valve varies in a group, driven as is usual here."""
-        return (*self.unknowns(group), *valve.freed), group.signal, self.drive
+        added = group.unknowns_of(valve.candidates)
+        return (*self.unknowns(group), *added), group.signal, self.drive
 
     def scan(
         self,

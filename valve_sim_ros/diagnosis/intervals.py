@@ -15,7 +15,7 @@ STEP = 0.3
 def intervals(
     fitter: Fitter, group: Group, valve: Valve, inflation: float
 ) -> dict[str, tuple[float, float]]:
-    """Return 95 % intervals of the freed parameters from the curvature of the cost.
+    """Return 95 % intervals of the added effects' parameters from the curvature of the cost.
 
     Parameters
     ----------
@@ -34,6 +34,7 @@ def intervals(
         By full name; the declared range where the data say nothing.
     """
     unknowns, signal, drive = fitter.problem(group, valve)
+    added = group.unknowns_of(valve.candidates)
     point = to_point(unknowns, valve.values)
     moved = []
     for index in range(point.size):
@@ -52,7 +53,7 @@ def intervals(
     spread = 1.96 * np.sqrt(np.maximum(np.diag(covariance), 0.0))
     found = {}
     for unknown, at, each in zip(unknowns, point, spread, strict=True):
-        if '.' in unknown.name and unknown in valve.freed:
+        if unknown in added:
             found[unknown.name] = (
                 unknown.outward(float(at - each)),
                 unknown.outward(float(at + each)),

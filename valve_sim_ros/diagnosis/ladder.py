@@ -219,7 +219,6 @@ def reconsidered(fitter: Fitter, group: Group, base: Valve, rungs: Sequence[Rung
             both,
             values={**both.values, **other.neutral},
             effects=tuple(name for name in both.effects if name != other.effect),
-            freed=(*base.freed, *one.unknowns),
             candidates=(*base.candidates, one),
         )
         return fitter.fit(valve, fitter.problem(group, valve))

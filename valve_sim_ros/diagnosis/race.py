@@ -168,7 +168,6 @@ def _screened(
     there = replace(
         valve,
         effects=tuple(dict.fromkeys((*valve.effects, candidate.effect))),
-        freed=(*valve.freed, *candidate.unknowns),
         candidates=(*valve.candidates, candidate),
     )
     problem = fitter.problem(group, there)

@@ -24,7 +24,7 @@ class Candidate:
 
     @property
     def unknowns(self) -> tuple[Unknown, ...]:
-        """Coordinates of the freed parameters."""
+        """Coordinates of the parameters that a fit frees."""
         return tuple(of_effect(self.effect, name) for name in self.names)
 
     @property
@@ -108,16 +108,25 @@ class Group:
         ]
         return (*base, *starts)
 
+    @property
+    def acting(self) -> tuple[str, ...]:
+        """The stages whose effects change this signal first."""
+        return (*self.stages, 'sensor') if self.signal == 'x' else self.stages
+
+    def unknowns_of(self, candidates: Iterable[Candidate]) -> tuple[Unknown, ...]:
+        """Return what a fit varies of added effects here: those of other groups stay as found."""
+        acting = [each for each in candidates if each.stage in self.acting]
+        return tuple(unknown for each in acting for unknown in each.unknowns)
+
     def candidates(self, without: Iterable[str] = ()) -> list[Candidate]:
         """Return the candidates that act in these stages."""
-        acting = (*self.stages, 'sensor') if self.signal == 'x' else self.stages
         found = []
         for effect in CATALOGUE.values():
             if effect.id in without:
                 continue
             for names in effect.variants or (tuple(p.name for p in effect.parameters),):
                 stage = declared(effect.id, names[0]).stage or effect.stage
-                if stage in acting:
+                if stage in self.acting:
                     found.append(Candidate(effect.id, names, stage))
         return found
 
