@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 from valve_sim_ros import simulate
 from valve_sim_ros.diagnosis import diagnose
@@ -13,6 +14,7 @@ from valve_sim_ros.diagnosis import race as racing
 from valve_sim_ros.diagnosis.adequacy import Leftover, leftover
 from valve_sim_ros.diagnosis.base_valve import starting_valve
 from valve_sim_ros.diagnosis.bench import Bench
+from valve_sim_ros.diagnosis.coarse import COARSE, rounded
 from valve_sim_ros.diagnosis.fitting import by_cost, Fitter
 from valve_sim_ros.diagnosis.ladder import concluded, excused, judged, Ladder, reconsidered, Rung
 from valve_sim_ros.diagnosis.race import race
@@ -23,6 +25,7 @@ STEM = groups(('p1', 'p2', 'x'))[-1]
 
 
 STAGES = {'f_d1': 0.5, 'T_g1': 2.0, 'T_g2': 5.0}
+VALVE = {**STAGES, 'f_s': 4.0, 'f_d': 2.4}
 
 
 def left(excess):
@@ -39,7 +42,7 @@ def measured(**effects):
     levels = np.random.default_rng(5).uniform(10.0, 90.0, 30)
     u = np.concatenate([np.zeros(20), np.repeat(levels, 50)])
     used = list({name.split('.')[0] for name in effects if '.' in name})
-    s = simulate(u, parameters={**STAGES, 'f_s': 4.0, 'f_d': 2.4, 'effects': used, **effects})
+    s = simulate(u, parameters={**VALVE, 'effects': used, **effects})
     rng = np.random.default_rng(1)
     noisy = [each + 0.2 * rng.standard_normal(u.size) for each in (s.p1, s.p2, s.x)]
     return Recording(s.t, u, *noisy)
@@ -113,3 +116,21 @@ def test_an_effect_found_in_p1_is_not_fitted_anew_to_p2():
     found = diagnose(record)
     assert [each.rung.effect for each in found.effects] == ['ip_calibration', 'air_leak']
     assert found.augmented.values['ip_calibration.span'] == pytest.approx(0.97, abs=0.01)
+
+
+@pytest.mark.parametrize('outcome', ['adequate', 'unknown_effect'])
+def test_steps_of_x_are_named_where_no_fit_shows_them(outcome):
+    """Noise of a third of a step comes out as whole steps, whether the model rounds x or not."""
+    record = measured()
+    colour = lfilter([1.0], [1.0, -0.8], np.random.default_rng(3).standard_normal(record.x.size))
+    step = 0.66
+    coarse = step * np.round((simulate(record.u, parameters=VALVE).x + 0.12 * colour) / step)
+    fitter, valve = fitted(Recording(record.time, record.u, record.p1, record.p2, coarse))
+    assert fitter.bench.noise['x'] < 0.1 * step
+    given = Ladder(STEM, outcome, valve, valve, left(50.0), left(50.0))
+    only = [each for each in STEM.candidates() if each.effect == COARSE]
+    found = rounded(fitter, given, only, lambda share: None, ())
+    assert found.outcome == 'missing_effect'
+    assert [rung.effect for rung in found.rungs] == [COARSE]
+    assert found.valve.values[f'{COARSE}.step'] == pytest.approx(step, rel=1e-3)
+    assert rounded(fitter, found, only, lambda share: None, ()) == found

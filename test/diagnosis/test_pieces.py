@@ -153,6 +153,10 @@ def test_a_coarse_sensor_shows_its_step():
     assert seen(late)[0] == pytest.approx(1.37, rel=1e-3)
     assert seen(record.x) == ()
     assert seen(np.round(record.x, 2)) == ()  # as written down, far below the noise
+    first = Bench([Recording(record.time, record.u, x=coarse)])
+    assert first.step_of_x == pytest.approx(1.37, rel=1e-6)
+    for other in (late, record.x, np.round(record.x, 1)):
+        assert Bench([Recording(record.time, record.u, x=other)]).step_of_x == 0.0
 
 
 def test_a_stem_put_to_rest_displaces_the_air_it_would_have_moved():

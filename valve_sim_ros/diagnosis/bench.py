@@ -15,9 +15,11 @@ from ..model.parameters import DELTA
 from ..model.pipeline import Array
 from ..model.scoring import BESIDE
 from ..recordings.recording import OUTPUTS, Recording
+from .adequacy import LOWEST
 from .errors import DiagnosisError
 from .readings import (
     answers_to_steps,
+    coarse_step,
     filled,
     slope_of,
     smooth,
@@ -289,12 +291,29 @@ class Bench:
             p1 = np.where(self._steps(result) > limit, np.nan, stretch.counts['p1'])
             stretch.recount({**stretch.counts, 'p1': p1})
 
+    def forgive_steps(self) -> None:
+        """Count the steps of x as noise, the quiet windows between two of them as well."""
+        steps = self.step_of_x / math.sqrt(12.0 * LOWEST)
+        self.noise['x'] = max(self.noise['x'], steps)
+        for stretch in self.stretches:
+            stretch.noise['x'] = self._uncertainty('x', stretch.measured['x'])
+            stretch.recount(stretch.counts)
+
+    @cached_property
+    def step_of_x(self) -> float:
+        """Step on whose multiples all x lie [% of span]; mostly 0."""
+        return coarse_step(self._all_x())
+
     @cached_property
     def steps_of_x(self) -> tuple[float, ...]:
         """Steps to whose multiples x keeps, the likeliest first [% of span]; mostly none."""
-        if 'x' not in self.signals:
-            return ()
-        return steps_kept(np.concatenate([s.measured['x'] for s in self.stretches]))
+        return steps_kept(self._all_x())
+
+    def _all_x(self) -> Array:
+        """Return all measured x, none if x is not measured."""
+        x = [s.measured['x'] for s in self.stretches if 'x' in self.signals]
+        values = np.concatenate([*x, np.empty(0)])
+        return values[np.isfinite(values)]
 
     @property
     def mixed(self) -> bool:

@@ -9,6 +9,7 @@ from ..identification.watch import Progress, Stop
 from . import odds
 from .adequacy import leftover
 from .base_valve import find_base
+from .coarse import COARSE, rounded
 from .fitting import Fitter, GENERATIONS, NARROW, Valve
 from .ladder import climb, concluded, excused, Ladder
 from .stages import Candidate, Group
@@ -64,10 +65,12 @@ def climb_all(
         if added and not _carried(ladders):
             plain = leftover(fitter.residuals(base, group.signal, ()))
             ladder = excused(ladder, plain)
-        unexplained = ladder.outcome == 'unknown_effect' and ladder.complete
-        if unexplained and candidates and group.has_stem:
+        if group.has_stem and ladder.complete:
             again = _within(tell, share + width, 0.0, f'{text} again')
-            ladder = _second_look(fitter, group, ladder, candidates, again, stops)
+            if fitter.bench.step_of_x and any(each.effect == COARSE for each in candidates):
+                ladder = rounded(fitter, ladder, candidates, again, stops)
+            elif candidates and ladder.outcome == 'unknown_effect':
+                ladder = _second_look(fitter, group, ladder, candidates, again, stops)
         if not ladder.complete:
             tell = _stop
         ladders.append(ladder)

@@ -12,6 +12,9 @@ from ..model.pipeline import Array
 
 FINEST, COARSEST, ON_STEPS, MOST_STEPS = 0.1, 10.0, 0.6, 3
 """Steps of a coarse sensor [%], how well x keeps to them (1: exactly), and how many are told."""
+OFF, ALL, LEAST_STEP, LEAST_VALUES = 0.05, 0.99, 0.3, 4
+"""How near to multiples of a coarse sensor's step [steps] nearly all x lie [share]; finer steps
+[%] are a usual resolution, and fewer values may be chance."""
 BIN, LONG = 0.01, 32
 """Bins in which x is counted [%], and how much longer their spectrum is than the span."""
 REST, FEW = 5, 8
@@ -153,3 +156,18 @@ def steps_kept(x: Array) -> tuple[float, ...]:
     alike = np.minimum(kept[peaks], 0.95 * kept[peaks].max(initial=0.0))  # halves of a step
     likeliest = peaks[np.argsort(-alike, kind='stable')[:MOST_STEPS]]
     return tuple((1.0 / frequency[likeliest]).tolist())
+
+
+def coarse_step(x: Array) -> float:
+    """Return the largest step on whose multiples x lies [% of span], 0 if it may be anywhere."""
+    found = 0.0
+    for rough in steps_kept(x):
+        step = rough
+        for _ in range(2):  # the spectrum knows it less well than its highest multiple does
+            multiples = np.round(x / step)
+            step = float(multiples @ x) / max(float(multiples @ multiples), 1.0)
+        multiples = np.round(x / step)
+        on_them = np.abs(x - step * multiples) < OFF * step
+        if on_them.mean() >= ALL and np.unique(multiples).size >= LEAST_VALUES:
+            found = max(found, step)
+    return found if found >= LEAST_STEP else 0.0

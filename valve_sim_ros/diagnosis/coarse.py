@@ -1,0 +1,79 @@
+# Copyright 2026 The valve_sim_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""A coarse position sensor, told by the values that x takes.
+
+Under a noise of a third of a step, rounding what is modelled explains no more of x than not to
+round it: nothing but these values shows the steps then.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+import math
+
+from . import odds
+from .adequacy import leftover
+from .fitting import Fitter
+from .ladder import climb, concluded, Ladder, Rung
+from .readings import OFF
+from .stages import Candidate
+
+COARSE = 'sensor_quantisation'
+
+
+def rounded(
+    fitter: Fitter,
+    ladder: Ladder,
+    candidates: Sequence[Candidate],
+    progress: Callable[[float], object],
+    stops: tuple[type[BaseException], ...],
+) -> Ladder:
+    """Return the ladder of an x that has steps with these named, unless the rest is unknown.
+
+    Where x is not explained, its steps are counted as noise and it is looked at again.
+    """
+    if COARSE in (rung.effect for rung in ladder.rungs):
+        return ladder
+    if ladder.outcome == 'unknown_effect':
+        fitter.bench.forgive_steps()
+        others = [each for each in candidates if each.effect != COARSE]
+        ladder = concluded(
+            climb(
+                fitter,
+                ladder.group,
+                ladder.valve,
+                others,
+                refit=True,
+                progress=progress,
+                stops=stops,
+            )
+        )
+    if ladder.outcome == 'unknown_effect':
+        return ladder
+    (candidate,) = (each for each in candidates if each.effect == COARSE)
+    rung = _read(fitter, ladder, candidate)
+    return replace(
+        ladder,
+        outcome='missing_effect',
+        valve=rung.valve,
+        after=rung.after,
+        rungs=(*ladder.rungs, rung),
+    )
+
+
+def _read(fitter: Fitter, ladder: Ladder, candidate: Candidate) -> Rung:
+    """Return the step to a coarse sensor.
+
+    The evidence is that all independent values lie so near to multiples of a step by chance.
+    """
+    group, before = ladder.group, ladder.after
+    valve = replace(
+        ladder.valve,
+        values={**ladder.valve.values, f'{COARSE}.step': fitter.bench.step_of_x},
+        effects=(*ladder.valve.effects, COARSE),
+        candidates=(*ladder.valve.candidates, candidate),
+    )
+    after = leftover(fitter.residuals(valve, group.signal))
+    gains = {COARSE: -before.samples / before.inflation * math.log(2.0 * OFF)}
+    probability = odds.probability(gains, COARSE, 1.0)
+    closed = before.closed_by(after)
+    return Rung(COARSE, candidate.stage, gains, before, after, closed, probability, (), valve)
