@@ -376,6 +376,18 @@ def test_an_effect_is_as_large_as_its_largest_parameter_is_for_one():
     assert odds.surprise(fitted(9.0, 1.0)) == 1
 
 
+def test_of_two_effects_that_fit_alike_the_one_in_its_usual_stage_is_named():
+    each = {c.effect: c for c in groups(('p1', 'p2', 'x'))[2].candidates() if len(c.names) == 1}
+    sizes = {'hysteresis.stem_width': 1.7, 'linkage_backlash.width': 1.9}
+    runners = [
+        Valve({**each[name].neutral, **sizes}, candidates=(each[name],))
+        for name in ('hysteresis', 'linkage_backlash')
+    ]
+    gains = {'hysteresis': 621.3, 'linkage_backlash': 621.0}
+    assert odds.choice(runners, gains) is runners[1]
+    assert odds.choice(runners, {**gains, 'hysteresis': 700.0}) is runners[0]
+
+
 def test_errors_of_any_size_can_be_compared():
     rng = np.random.default_rng(2)
     noise, misfit = rng.standard_normal(5000), np.linspace(-400.0, 400.0, 5000)

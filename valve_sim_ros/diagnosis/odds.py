@@ -90,9 +90,9 @@ def twin_limit(gained: float, share: float = TWIN_SHARE) -> float:
 
 
 def surprise(valve: Valve) -> int:
-    """Return how odd a fitted effect is: parameters of wrong sign, too large, or all too small."""
+    """Return how odd a fitted effect is: of wrong sign, too large, too small, or elsewhere."""
     candidate = valve.candidates[-1]
-    odd = 0
+    odd = int(candidate.stage != CATALOGUE[candidate.effect].stage)
     for name in candidate.names:
         parameter = declared(candidate.effect, name)
         change = valve.values[f'{candidate.effect}.{name}'] - parameter.neutral

@@ -87,12 +87,14 @@ def race(
         return len(in_reach(valve, runners[:most])) if far_ahead else most
 
     def beside(best: Valve, runner: Valve) -> Valve:
-        """Return one that looks like the best, refitted from the best's base valve as well."""
-        effect, other = best.candidates[-1].effect, runner.candidates[-1].effect
-        if effect == other or not odds.look_alike(effect, other):
+        """Return one that looks like the best, sought from the best's base valve as well."""
+        effect, candidate = best.candidates[-1].effect, runner.candidates[-1]
+        if effect == candidate.effect or not odds.look_alike(effect, candidate.effect):
             return runner
         base = {unknown.name: best.values[unknown.name] for unknown in fitter.unknowns(group)}
-        return min(runner, fitted(replace(runner, values={**runner.values, **base})), key=by_cost)
+        starts = [{**runner.values, **base, **own} for own in ({}, *candidate.starts(seen))]
+        there = fitter.scan(runner, starts, fitter.problem(group, runner))[0]
+        return min(runner, fitted(there), key=by_cost)
 
     with ThreadPoolExecutor(os.cpu_count()) as pool:  # compiled runs release the lock
 
