@@ -21,6 +21,7 @@ from .readings import (
     answers_to_steps,
     coarse_step,
     filled,
+    REST,
     slope_of,
     smooth,
     steps_kept,
@@ -107,7 +108,8 @@ class Bench:
                     # one that creeps seems to rest
                     stretch.speed = slope / float(np.median(np.diff(stretch.time)))
                 else:
-                    stretch.begins = np.where(samples < departed, stretch.rests, np.nan)
+                    # a first slip that was seen on its way must not be put to rest there
+                    stretch.begins = np.where(samples < departed - REST, stretch.rests, np.nan)
         self.size = sum(stretch.u.size for stretch in self.stretches)
 
     def run(

@@ -271,7 +271,9 @@ def judged(
     after = leftover(fitter.residuals(best, group.signal))
     change = before.mean_square - after.mean_square
     least = odds.LEAST_SHIFT if candidate.effect in odds.LASTING else odds.LEAST_CHANGE
-    if gains[candidate.effect] < odds.ENOUGH or change < least:
+    # where a few far errors were the only reason to look, they must be gone
+    only_far = before.excess < odds.LEAST_EXCESS[group.signal] and after.far >= odds.LEAST_FAR
+    if gains[candidate.effect] < odds.ENOUGH or change < least or only_far:
         return None
     closed = before.closed_by(after)
     return Rung(
