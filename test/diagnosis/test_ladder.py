@@ -3,6 +3,7 @@
 """The rules by which effects are kept, exchanged and called unknown."""
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -16,7 +17,15 @@ from valve_sim_ros.diagnosis.base_valve import starting_valve
 from valve_sim_ros.diagnosis.bench import Bench
 from valve_sim_ros.diagnosis.coarse import COARSE, rounded
 from valve_sim_ros.diagnosis.fitting import by_cost, Fitter
-from valve_sim_ros.diagnosis.ladder import concluded, excused, judged, Ladder, reconsidered, Rung
+from valve_sim_ros.diagnosis.ladder import (
+    climb,
+    concluded,
+    excused,
+    judged,
+    Ladder,
+    reconsidered,
+    Rung,
+)
 from valve_sim_ros.diagnosis.race import race
 from valve_sim_ros.diagnosis.stages import groups
 from valve_sim_ros.recordings.recording import Recording
@@ -129,8 +138,9 @@ def test_steps_of_x_are_named_where_no_fit_shows_them(outcome):
     assert fitter.bench.noise['x'] < 0.1 * step
     given = Ladder(STEM, outcome, valve, valve, left(50.0), left(50.0))
     only = [each for each in STEM.candidates() if each.effect == COARSE]
-    found = rounded(fitter, given, only, lambda share: None, ())
+    again = partial(climb, fitter, STEM, valve, refit=True, progress=lambda share: None, stops=())
+    found = rounded(fitter, given, only, again)
     assert found.outcome == 'missing_effect'
     assert [rung.effect for rung in found.rungs] == [COARSE]
     assert found.valve.values[f'{COARSE}.step'] == pytest.approx(step, rel=1e-3)
-    assert rounded(fitter, found, only, lambda share: None, ()) == found
+    assert rounded(fitter, found, only, again) == found

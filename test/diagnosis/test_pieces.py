@@ -20,6 +20,7 @@ from valve_sim_ros.diagnosis.evolution import evolve
 from valve_sim_ros.diagnosis.fitting import Fitter, Valve
 from valve_sim_ros.diagnosis.proof import closed
 from valve_sim_ros.diagnosis.readings import straightened
+from valve_sim_ros.diagnosis.seen import calibration_seen, friction_seen, mixed_arrivals
 from valve_sim_ros.diagnosis.stages import groups
 from valve_sim_ros.diagnosis.stretch import CAUGHT, HELD, ON_TIME
 from valve_sim_ros.diagnosis.unknowns import complete
@@ -283,7 +284,7 @@ def test_single_steps_of_the_command_show_whether_arrivals_are_mixed():
     for p1, mixed in ((record.p1, False), (some, True), (each, False)):
         bench = Bench([Recording(record.time, record.u, p1)])
         wrong = [np.tile(1.2 * record.u, (4, 1))]  # an effect spoils the base valve
-        assert bench.mixed_arrivals(wrong) == mixed
+        assert mixed_arrivals(bench, wrong) == mixed
 
 
 def test_a_command_that_always_moves_shows_it_too_and_no_lag_passes_for_chance():
@@ -295,7 +296,7 @@ def test_a_command_that_always_moves_shows_it_too_and_no_lag_passes_for_chance()
     lagging = lfilter([0.5], [1.0, -0.5], u - u[0]) + u[0]
     for p1, mixed in ((u, False), (some, True), (last, False), (lagging, False)):
         bench = Bench([Recording(0.2 * np.arange(3000), u, p1 + noise)])
-        assert bench.mixed_arrivals([np.tile(u, (4, 1))]) == mixed
+        assert mixed_arrivals(bench, [np.tile(u, (4, 1))]) == mixed
 
 
 @pytest.mark.parametrize('signals', [('p1', 'p2'), ('p2',)])
@@ -346,10 +347,10 @@ def test_data_show_where_a_signal_begins_and_what_holds_the_stem():
     bench = Bench([record])
     assert bench.stretches[0].first['x'] == pytest.approx(0.0, abs=0.2)
     results = bench.run(complete({**VALUES, 'p1_0': 0.0, 'p2_0': 0.0, 'x_0': 0.0}))
-    friction, _ = bench.friction_seen(results)
+    friction, _ = friction_seen(bench, results)
     assert friction == pytest.approx(VALUES['f_s'], rel=0.25)
     off = Bench([Recording(record.time, record.u, record.p1, record.p2, 0.9 * record.x + 4.0)])
-    (_, zero), (_, span) = off.calibration_seen(results).values()
+    (_, zero), (_, span) = calibration_seen(off, results).values()
     assert span == pytest.approx(0.9, abs=0.03)
     assert zero == pytest.approx(4.0, abs=1.5)
 

@@ -11,9 +11,10 @@ import numpy as np
 
 from . import odds
 from .adequacy import leftover
-from .bench import Bench, ENOUGH_STEPS, LEAST_EACH, MIXED_JITTER
+from .bench import Bench, MIXED_JITTER
 from .fitting import by_cost, eased, Fitter, NARROW, Problem, SHORT, Valve
 from .readings import shifts_of_steps
+from .seen import ENOUGH_STEPS, friction_seen, LEAST_EACH, mixed_arrivals
 from .stages import Group
 from .starts import friction_grid, grid, START, STEMS
 from .unknowns import EARLY, LATE, PHASE
@@ -60,7 +61,7 @@ def find_base(
         name = 'f_s'
         if group.stages == ('p2-x',):
             name = 'f_d/f_s'
-            seen, _ = fitter.bench.friction_seen(fitter.results(valve))
+            seen, _ = friction_seen(fitter.bench, fitter.results(valve))
             around = friction_grid(seen)
             starts += [{**valve.values, **there, **stem} for there in around for stem in STEMS]
         levels = dict.fromkeys(start[name] for start in starts)
@@ -145,6 +146,6 @@ def _settle_phase(fitter: Fitter, group: Group, valve: Valve) -> None:
     fitter.phase = EARLY if best[0].cost <= best[1].cost else LATE
     on_time = replace(best[0], values={**best[0].values, 'phase': 0.0})
     results = fitter.results(on_time, ())
-    if fitter.bench.mixed_arrivals(results):
+    if mixed_arrivals(fitter.bench, results):
         fitter.bench.weigh_down(MIXED_JITTER, results)
         fitter.phase = PHASE

@@ -4,6 +4,7 @@
 
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import replace
+from functools import partial
 
 from ..identification.watch import Progress, Stop
 from . import odds
@@ -12,7 +13,7 @@ from .base_valve import find_base
 from .coarse import COARSE, rounded
 from .fitting import Fitter, GENERATIONS, NARROW, Valve
 from .ladder import climb, concluded, excused, Ladder
-from .stages import Candidate, Group
+from .stages import Group
 from .stretch import CAUGHT, HELD, RESTS
 
 
@@ -66,11 +67,19 @@ def climb_all(
             plain = leftover(fitter.residuals(base, group.signal, ()))
             ladder = excused(ladder, plain)
         if group.has_stem and ladder.complete:
-            again = _within(tell, share + width, 0.0, f'{text} again')
+            again = partial(
+                climb,
+                fitter,
+                group,
+                ladder.valve,
+                refit=True,
+                progress=_within(tell, share + width, 0.0, f'{text} again'),
+                stops=stops,
+            )
             if fitter.bench.step_of_x and any(each.effect == COARSE for each in candidates):
-                ladder = rounded(fitter, ladder, candidates, again, stops)
+                ladder = rounded(fitter, ladder, candidates, again)
             elif candidates and ladder.outcome == 'unknown_effect':
-                ladder = _second_look(fitter, group, ladder, candidates, again, stops)
+                ladder = _second_look(fitter, ladder, partial(again, candidates))
         if not ladder.complete:
             tell = _stop
         ladders.append(ladder)
@@ -94,14 +103,7 @@ def _carried(ladders: Sequence[Ladder]) -> float:
     return max((excess for excess in left if excess > odds.CLEAN), default=0.0)
 
 
-def _second_look(
-    fitter: Fitter,
-    group: Group,
-    ladder: Ladder,
-    candidates: Sequence[Candidate],
-    progress: Callable[[float], object],
-    stops: tuple[type[BaseException], ...],
-) -> Ladder:
+def _second_look(fitter: Fitter, ladder: Ladder, again: Callable[[], Ladder]) -> Ladder:
     """Return what a stem shows that is put to rest where it was seen to rest, if it is named.
 
     A stem that slips on and on is soon a whole slip off, and then hides what each slip lacks.
@@ -110,21 +112,11 @@ def _second_look(
     drive, complete = fitter.drive, ladder.complete
     for how in (CAUGHT, RESTS):
         fitter.drive = (*drive, how)
-        found = concluded(
-            climb(
-                fitter,
-                group,
-                ladder.valve,
-                candidates,
-                refit=True,
-                progress=progress,
-                stops=stops,
-            )
-        )
+        found = concluded(again())
         fitter.drive = drive
         complete = complete and found.complete
         if found.outcome == 'missing_effect':
-            valve = fitter.refined(found.valve, fitter.problem(group, found.valve))
+            valve = fitter.refined(found.valve, fitter.problem(ladder.group, found.valve))
             return replace(found, valve=valve, base=ladder.base)
         if not complete:
             break

@@ -13,7 +13,7 @@ import math
 from . import odds
 from .adequacy import leftover
 from .fitting import Fitter
-from .ladder import climb, concluded, Ladder, Rung
+from .ladder import concluded, Ladder, Rung
 from .readings import OFF
 from .stages import Candidate
 
@@ -24,29 +24,18 @@ def rounded(
     fitter: Fitter,
     ladder: Ladder,
     candidates: Sequence[Candidate],
-    progress: Callable[[float], object],
-    stops: tuple[type[BaseException], ...],
+    again: Callable[[Sequence[Candidate]], Ladder],
 ) -> Ladder:
     """Return the ladder of an x that has steps with these named, unless the rest is unknown.
 
-    Where x is not explained, its steps are counted as noise and it is looked at again.
+    Where x is not explained, its steps are counted as noise and the ladder is climbed `again`.
     """
     if COARSE in (rung.effect for rung in ladder.rungs):
         return ladder
     if ladder.outcome == 'unknown_effect':
         fitter.bench.forgive_steps()
         others = [each for each in candidates if each.effect != COARSE]
-        ladder = concluded(
-            climb(
-                fitter,
-                ladder.group,
-                ladder.valve,
-                others,
-                refit=True,
-                progress=progress,
-                stops=stops,
-            )
-        )
+        ladder = concluded(again(others))
     if ladder.outcome == 'unknown_effect':
         return ladder
     (candidate,) = (each for each in candidates if each.effect == COARSE)

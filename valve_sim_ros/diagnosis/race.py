@@ -16,6 +16,7 @@ from ..model.pipeline import Array
 from . import odds
 from .adequacy import leftover
 from .fitting import by_cost, eased, FAINT, Fitter, LONG, Problem, SHORT, Valve
+from .seen import calibration_seen, friction_seen
 from .stages import Candidate, Group
 from .starts import friction_grid
 from .stretch import RESTS
@@ -53,9 +54,9 @@ def race(
         seen = {
             'swings': _swings(fitter, residual),
             'steps': fitter.bench.steps_of_x,
-            **fitter.bench.calibration_seen(results),
+            **calibration_seen(fitter.bench, results),
         }
-        frictions = friction_grid(fitter.bench.friction_seen(results)[0])
+        frictions = friction_grid(friction_seen(fitter.bench, results)[0])
     done = 0
 
     def count(runner: Valve) -> Valve:
