@@ -24,6 +24,7 @@ from valve_sim_ros.diagnosis.seen import calibration_seen, friction_seen, mixed_
 from valve_sim_ros.diagnosis.stages import groups
 from valve_sim_ros.diagnosis.stretch import CAUGHT, HELD, ON_TIME
 from valve_sim_ros.diagnosis.unknowns import complete
+from valve_sim_ros.diagnosis.workers import cheapest
 from valve_sim_ros.model.effects import CATALOGUE
 from valve_sim_ros.recordings.recording import Recording
 
@@ -272,6 +273,20 @@ def test_a_loop_is_seen_through_a_stem_held_where_it_was_measured():
     held = excess(values, (HELD,))
     assert held < 0.1 * excess(values, ())
     assert held < 0.1 * excess({**values, 'positioner_loop.initial_integral': 0.0}, (HELD,))
+
+
+def test_the_cheapest_are_right_where_costs_stop_counting_at_a_bound():
+    costs = np.random.default_rng(3).permutation(200).astype(float)
+
+    def counted(cost, bound):
+        return min(cost, bound + 0.5)
+
+    found = cheapest(counted, costs, 7)
+    assert np.argsort(found)[:7].tolist() == np.argsort(costs)[:7].tolist()
+    assert sorted(found)[:7] == list(range(7))
+    assert max(found) < costs.max()
+    assert np.array_equal(cheapest(counted, costs[:5], 7), costs[:5])
+    assert min(cheapest(counted, costs[costs > 50.0], 7, bound=20.0)) == 20.5
 
 
 def test_single_steps_of_the_command_show_whether_arrivals_are_mixed():

@@ -13,6 +13,7 @@ import numpy as np
 
 from ..model.pipeline import Array
 from ..model.scoring import HUBER
+from .workers import at_once
 
 
 class Minimum(NamedTuple):
@@ -41,12 +42,8 @@ def descend(
     damping = 1e-2
     for _ in range(most):
         weights = np.sqrt(np.minimum(1.0, HUBER / np.maximum(np.abs(now), 1e-12)))
-        columns = []
-        for index in range(point.size):
-            moved = point.copy()
-            moved[index] += step
-            columns.append((residuals(moved) - now) / step)
-        jacobian = np.stack(columns, axis=1) * weights[:, None]
+        moved = at_once(residuals, point + step * np.eye(point.size))
+        jacobian = (np.stack(moved, axis=1) - now[:, None]) / step * weights[:, None]
         normal, gradient = jacobian.T @ jacobian, jacobian.T @ (now * weights)
         diagonal = np.diag(normal) + 1e-9 * max(np.trace(normal), 1e-12)
         better = False

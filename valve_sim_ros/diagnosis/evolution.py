@@ -9,6 +9,7 @@ import numpy as np
 
 from ..model.pipeline import Array
 from .descent import Minimum
+from .workers import cheapest
 
 BOUND = 6.0
 """Points this many times as costly as the best are all the same."""
@@ -56,7 +57,7 @@ def evolve(
         roots = np.sqrt(np.maximum(values, 1e-20))
         steps = rng.standard_normal((size, n)) * roots @ axes.T
         points = mean + sigma * spread * steps
-        costs = np.array([cost(each, BOUND * best.cost) for each in points])
+        costs = np.array(cheapest(cost, points, parents, BOUND * best.cost))
         order = np.argsort(costs, kind='stable')[:parents]
         if costs[order[0]] < best.cost:
             best = Minimum(points[order[0]], float(costs[order[0]]))

@@ -16,6 +16,7 @@ from .evolution import evolve
 from .stages import Candidate, Group
 from .stretch import CAUGHT, ON_TIME, PUT_TO_REST
 from .unknowns import complete, PHASE, to_point, to_values, Unknown
+from .workers import cheapest
 
 HOPELESS = 1e3
 """Residual of a run that is not finite [noise]."""
@@ -183,11 +184,7 @@ class Fitter:
     ) -> list[Valve]:
         """Return the best starts, best first."""
         _, signal, drive = problem
-        tried: list[Valve] = []
-        bound = math.inf
-        for start in starts:
-            there = replace(valve, values=start)
-            cost = self.score(there, signal, drive, bound)
-            tried = sorted([*tried, replace(there, cost=cost)], key=by_cost)[:count]
-            bound = tried[-1].cost if len(tried) == count else math.inf
-        return tried
+        there = [replace(valve, values=start) for start in starts]
+        costs = cheapest(lambda each, bound: self.score(each, signal, drive, bound), there, count)
+        each = [replace(one, cost=cost) for one, cost in zip(there, costs, strict=True)]
+        return sorted(each, key=by_cost)[:count]

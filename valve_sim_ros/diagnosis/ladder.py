@@ -12,7 +12,7 @@ from . import odds
 from .adequacy import Leftover, leftover
 from .base_valve import find_base
 from .fitting import by_cost, Fitter, Valve
-from .race import in_reach, race, rebased
+from .race import FAR_AHEAD, in_reach, race, rebased
 from .stages import Candidate, Group
 from .stretch import PUT_TO_REST
 
@@ -187,15 +187,23 @@ def deepened(
 
     Not beside those whose runs take long: it would take minutes.
     """
-    if leftover(fitter.residuals(runners[0], group.signal)).excess <= odds.CLEAN:
+
+    def explains(runner: Valve) -> bool:
+        return leftover(fitter.residuals(runner, group.signal)).excess <= odds.CLEAN
+
+    best = runners[0]
+    if explains(best):
         return runners
     found = []
     for each in in_reach(valve, odds.best_per_effect(runners)[:DEEPENED]):
-        if CATALOGUE[each.candidates[-1].effect].laborious:
+        # far behind one that explains the signal, others need no deeper search
+        hopeless = explains(best) and each.cost > best.cost / FAR_AHEAD
+        if hopeless or CATALOGUE[each.candidates[-1].effect].laborious:
             continue
         progress(1.0)
         there = find_base(fitter, group, each, fitter.drive)
         found.append(fitter.refined(there, fitter.problem(group, there)))
+        best = min(best, found[-1], key=by_cost)
     return sorted([*found, *runners], key=by_cost)
 
 

@@ -238,6 +238,27 @@ def stop_between(
 
 
 @njit
+def break_away(
+    x: float, target: float, excess: float, rate: float, left: float, friction: Friction
+) -> tuple[float, float, float]:
+    """Return when a resting stem breaks away, `left` seconds if it does not before, and where to.
+
+    The opening force is target + excess exp(-rate tau); the third value is its excess then.
+    """
+    spring = friction.stiffness * x
+    up, down = spring + friction.static_up, spring - friction.static_down
+    pressure = target + excess
+    if not down <= pressure <= up:
+        return 0.0, 1.0 if pressure > up else -1.0, excess
+    final = target + excess * math.exp(-rate * left)
+    if down <= final <= up:
+        return left, 0.0, excess
+    level = up if final > up else down
+    wait = -math.log((level - target) / excess) / rate
+    return max(wait, 0.0), 1.0 if final > up else -1.0, level - target
+
+
+@njit
 def through_events(
     stem: Stem,
     target: float,
@@ -253,21 +274,11 @@ def through_events(
     left = duration
     for _ in range(MAX_EVENTS):
         if stem.direction == 0.0:
-            spring = friction.stiffness * stem.x
-            up, down = spring + friction.static_up, spring - friction.static_down
-            pressure = target + excess
-            if pressure <= up and pressure >= down:
-                final = target + excess * math.exp(-rate * left)
-                if final <= up and final >= down:
-                    return stem
-                level = up if final > up else down
-                wait = -math.log((level - target) / excess) / rate
-                if wait >= left:
-                    return stem
-                left -= max(wait, 0.0)
-                excess = level - target
-                pressure = final
-            stem = Stem(stem.x, 0.0, 1.0 if pressure > up else -1.0, False)
+            wait, direction, excess = break_away(stem.x, target, excess, rate, left, friction)
+            if wait >= left:
+                return stem
+            left -= wait
+            stem = Stem(stem.x, 0.0, direction, False)
         slip = begin_slip(stem, target, excess, friction, forced, poles)
         stop, armed = first_stop(slip, stem.direction, stem.armed, delta, left, poles)
         if stop >= 0.0:

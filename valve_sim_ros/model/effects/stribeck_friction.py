@@ -9,12 +9,17 @@ from numba import njit
 
 from ..declarations import Effect, EffectParameter
 from ..state import Motion, moved
-from ..stem import Friction, Stem, visible
+from ..stem import break_away, Friction, Stem, visible
 
-STEP, STABLE = 0.002, 0.4
-"""Longest step [s], and longest step times the fastest rate of the stem."""
-CALM, STEADY = 4, 0.003
-"""How much longer steps are while a short one changes the speed by no more than this part."""
+TOLERANCE, SLOW = 5e-4, 0.2
+"""Error of the speed in a step, as a part of the speed, or of so much of v_s if that is more."""
+FIRST, SHORTEST, STABLE = 0.05, 2e-4, 2.4
+"""First step of a slip times the fastest rate of the stem, shortest [s], and longest, likewise."""
+LESS, MORE, SAFE = 0.3, 3.0, 0.8
+"""A step is at least and at most so many times the one before, and so much of what would do."""
+LEAST, NOTHING = 0.05, 1e-9
+"""Part of a step that a stem takes at least to stop, and the time left [s] that is none: a stem
+that cannot start must not hang."""
 FAST = 5.0
 """Speed beyond which nothing of f_s - f_d is left [v_s]."""
 
@@ -35,41 +40,38 @@ class Slipping(NamedTuple):
 def motion(value: Any, state: Any, p: Any, memory: Any, dt: float) -> Motion:
     """Repeat the step, if the stem moves in it, with friction that follows its speed.
 
-    Classical Runge-Kutta in short steps: friction that falls with speed feeds itself, and a train
-    of slips remembers every error.
+    Classical Runge-Kutta, its steps as short as the speed asks: friction that falls with speed
+    feeds itself, and a train of slips remembers every error.
     """
     moves = state.direction != 0.0 or value.stem.direction != 0.0 or value.stem.x != state.x
     if p[0] <= 0.0 or dt == 0.0 or not moves:
         return value
-    f, theta = value.friction, value.theta
+    f, theta, rate = value.friction, value.theta, value.rate
     a_1, a_2 = visible(theta.a_1, theta.a_2)
     fastest = max(a_2, math.sqrt(a_1 * f.stiffness))
-    left = math.ceil(dt / min(STEP, STABLE / fastest))
-    short = dt / left
-    decay = math.exp(-value.rate * short)
     stem = Stem(state.x, state.v, state.direction, state.armed != 0.0)
     slip = slipping(stem.direction, f, a_1, a_2, p[0])
-    end = value.target + value.excess
-    calm = False
-    while left > 0:
-        count = CALM if calm and left >= CALM else 1
-        begin, h = end, count * short
-        end = value.target + (begin - value.target) * (decay**CALM if count == CALM else decay)
-        left -= count
+    excess, left, longest = value.excess, dt, STABLE / fastest
+    h = longest
+    while left > NOTHING:
         if stem.direction == 0.0:
-            spring = f.stiffness * stem.x
-            up, down = spring + f.static_up, spring - f.static_down
-            if down <= end <= up:
-                continue
-            level = up if end > up else down
-            if down <= begin <= up:  # it breaks away within the step
-                h *= (end - level) / (end - begin)
-                begin = level
-            stem = Stem(stem.x, 0.0, 1.0 if end > up else -1.0, False)
-            slip = slipping(stem.direction, f, a_1, a_2, p[0])
-        speed = stem.v
-        stem = slipped(stem, begin, end, h, slip, theta.delta)
-        calm = abs(stem.v - speed) < STEADY * count * abs(speed)
+            wait, direction, excess = break_away(stem.x, value.target, excess, rate, left, f)
+            if wait >= left:
+                break
+            left -= wait
+            stem = Stem(stem.x, 0.0, direction, False)
+            slip = slipping(direction, f, a_1, a_2, p[0])
+            h = FIRST / fastest
+        h = min(h, left)
+        decay = math.exp(-0.5 * rate * h)
+        after, part, error = slipped(stem, value.target, excess, decay, h, slip, theta.delta)
+        factor = min(max(SAFE * (1.0 / max(error, 1e-9)) ** (1.0 / 3.0), LESS), MORE)
+        again = error > 1.0 and h > SHORTEST
+        if not again:
+            stem = after
+            left -= part * h
+            excess *= math.exp(-rate * part * h) if part < 1.0 else decay * decay
+        h = min(max(factor * h, SHORTEST), longest)
     return moved(value, stem, value.p2)
 
 
@@ -84,25 +86,36 @@ def slipping(direction: float, f: Friction, a_1: float, a_2: float, fall: float)
 
 @njit
 def slipped(
-    stem: Stem, before: float, after: float, h: float, slip: Slipping, delta: float
-) -> Stem:
-    """Return the stem after `h` seconds in which p2 goes from `before` to `after`, or its stop."""
+    stem: Stem,
+    target: float,
+    excess: float,
+    decay: float,
+    h: float,
+    slip: Slipping,
+    delta: float,
+) -> tuple[Stem, float, float]:
+    """Return the stem after `h` seconds, or at its stop, which part it took, and the error.
+
+    The excess of p2 over the target falls by `decay` in half of `h`; the error is in tolerances.
+    """
     x, v = stem.x, stem.v
-    middle = 0.5 * (before + after)
-    a1 = acceleration(before, x, v, slip)
+    middle = target + excess * decay
+    a1 = acceleration(target + excess, x, v, slip)
     v2 = v + 0.5 * h * a1
     a2 = acceleration(middle, x + 0.5 * h * v, v2, slip)
     v3 = v + 0.5 * h * a2
     a3 = acceleration(middle, x + 0.5 * h * v2, v3, slip)
     v4 = v + h * a3
-    a4 = acceleration(after, x + h * v3, v4, slip)
+    a4 = acceleration(target + excess * decay * decay, x + h * v3, v4, slip)
+    error = h * (abs(a3 - a2) + abs(a1 - a2 - a3 + a4) / 6.0)
+    error /= TOLERANCE * (abs(v) + SLOW * slip.fall)
     end = v + h / 6.0 * (a1 + 2.0 * (a2 + a3) + a4)
     speed = slip.direction * end
     if speed <= 0.0 or (stem.armed and speed <= delta):
-        part = v / (v - end) if v != end else 0.0
-        return Stem(x + 0.5 * h * part * v, 0.0, 0.0, False)
+        part = max(v / (v - end) if v != end else 0.0, LEAST)
+        return Stem(x + 0.5 * h * part * v, 0.0, 0.0, False), min(part, 1.0), error
     x += h / 6.0 * (v + 2.0 * (v2 + v3) + v4)
-    return Stem(x, end, slip.direction, stem.armed or speed > delta)
+    return Stem(x, end, slip.direction, stem.armed or speed > delta), 1.0, error
 
 
 @njit(forceinline=True)
