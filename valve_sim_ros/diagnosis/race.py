@@ -2,10 +2,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """The race: each candidate effect is refitted together with the base valve of its group."""
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from functools import partial
+from itertools import product
 import os
 
 import numpy as np
@@ -18,7 +19,7 @@ from .adequacy import leftover
 from .fitting import by_cost, eased, FAINT, Fitter, LONG, Problem, SHORT, Valve
 from .seen import calibration_seen, friction_seen
 from .stages import Candidate, Group
-from .starts import friction_grid
+from .starts import friction_grid, STEMS
 from .stretch import RESTS
 
 ROUNDS = ((40, 5), (10, 14), (4, 30))
@@ -28,8 +29,8 @@ MOST_STARTS, FEWER_STARTS = 24, 8
 so many of the best."""
 SCREENED, FINISHERS, REFINED = 3, 5, 2
 """How many starts of a candidate are followed, runners refitted, and refined to the end."""
-GENERATIONS = 30
-"""For how long each start is followed by an evolution where a fit has many valleys."""
+FOLLOWED, DESCENT = 6, 12
+"""So many of the valves that were fitted to single slips are fitted to all, in so many steps."""
 FAR_AHEAD, BEHIND = 0.2, 0.5
 """Where the best leaves no more than this part of the cost, or nothing but noise, runners short of
 more than a part of its gain are not followed."""
@@ -190,11 +191,34 @@ def _screened(
 
     found = best(problem, SCREENED)
     if CATALOGUE[candidate.effect].rugged:
-        found += [fitter.evolve(each, way, GENERATIONS) for each in best(way, SCREENED)]
+        found += _slip_by_slip(fitter, there, [one for some in starts for one in some], problem)
     elif way != problem:
         found += [fitter.fit(each, way, SHORT) for each in best(way, 1)]
     steps = SHORT if group.has_stem else LONG
     return min((fitter.fit(each, problem, steps) for each in found), key=by_cost)
+
+
+def _slip_by_slip(
+    fitter: Fitter, valve: Valve, starts: Sequence[Mapping[str, float]], problem: Problem
+) -> list[Valve]:
+    """Return valves that were fitted to single slips first, and then to all in a row.
+
+    A stem that is put to rest wherever it was seen to rest begins each slip right, whatever it
+    made of the one before: the cost has few valleys then.
+    """
+    unknowns, signal, drive = problem
+    alone = (unknowns, signal, (*drive, RESTS))
+    apart: dict[tuple[float, ...], list[Mapping[str, float]]] = {}
+    names = [unknown.name for unknown in unknowns if unknown.name != 'f_s']
+    for start, stem in product(starts, STEMS):
+        there = {**start, **stem}
+        apart.setdefault(tuple(there[name] for name in names), []).append(there)
+    nearest = [fitter.scan(valve, some, alone)[0] for some in apart.values()]
+    each = [fitter.fit(one, alone, DESCENT) for one in nearest]
+    found = sorted(each, key=by_cost)[:FOLLOWED]
+    for way in eased(problem):
+        found = [fitter.fit(each, way, DESCENT) for each in found]
+    return found
 
 
 def _swings(fitter: Fitter, residual: Array) -> tuple[float, ...]:
