@@ -29,6 +29,8 @@ MOST_STARTS, FEWER_STARTS = 24, 8
 so many of the best."""
 SCREENED, FINISHERS, REFINED = 3, 5, 2
 """How many starts of a candidate are followed, runners refitted, and refined to the end."""
+GENERATIONS = 30
+"""For how long each start is followed by an evolution where a fit has many valleys."""
 FOLLOWED, DESCENT = 6, 12
 """So many of the valves that were fitted to single slips are fitted to all, in so many steps."""
 FAR_AHEAD, BEHIND = 0.2, 0.5
@@ -191,6 +193,7 @@ def _screened(
 
     found = best(problem, SCREENED)
     if CATALOGUE[candidate.effect].rugged:
+        found += [fitter.evolve(each, way, GENERATIONS) for each in best(way, SCREENED)]
         found += _slip_by_slip(fitter, there, [one for some in starts for one in some], problem)
     elif way != problem:
         found += [fitter.fit(each, way, SHORT) for each in best(way, 1)]
