@@ -14,14 +14,8 @@ import pytest
 from valve_sim_ros import InitialState, ModelError, read_parameters, simulate, Valve, ValveSpec
 from valve_sim_ros.model import kernels, pipeline
 from valve_sim_ros.model.electro_pneumatic import backlash
-from valve_sim_ros.model.stem import (
-    forced_gain,
-    free_motion,
-    Friction,
-    Stem,
-    stem_poles,
-    stem_step,
-)
+from valve_sim_ros.model.slip import forced_gain, free_motion, stem_poles
+from valve_sim_ros.model.stem import Friction, Stem, stem_step
 from valve_sim_ros.model.tables import parameter_table, sample_file
 
 LEVEL = st.floats(0.0, 100.0)

@@ -22,8 +22,9 @@ import numpy.typing as npt
 from .borrowing import borrowed
 from .electro_pneumatic import backlash
 from .pneumatic import chamber_pressure, is_filling
+from .slip import free_motion, stem_poles
 from .state import BASE_STEP, Lag, lag_over, Motion, State, Theta, Transition, transition_over
-from .stem import free_motion, Friction, Stem, stem_poles, stem_step
+from .stem import Friction, Stem, stem_step
 
 Array = npt.NDArray[np.float64]
 

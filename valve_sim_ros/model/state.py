@@ -7,7 +7,8 @@ from typing import NamedTuple
 
 from numba import njit
 
-from .stem import forced_gain, free_motion, Friction, Poles, Stem, stem_poles
+from .slip import forced_gain, free_motion, Poles, stem_poles
+from .stem import Friction, Stem
 
 
 class State(NamedTuple):

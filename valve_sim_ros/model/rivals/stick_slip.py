@@ -7,7 +7,8 @@ import math
 from numba import njit
 
 from ..pipeline import Array
-from ..stem import forced_gain, free_motion, Friction, Stem, stem_poles, stem_step
+from ..slip import forced_gain, free_motion, stem_poles
+from ..stem import Friction, Stem, stem_step
 from .layout import A_1, A_2, ARMED, DIRECTION, F_D, F_S, V, X
 from .physical import substeps
 
