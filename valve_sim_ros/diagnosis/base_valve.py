@@ -3,9 +3,7 @@
 """The search for the base valve, with effects in force or without."""
 
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
-import os
 
 import numpy as np
 
@@ -94,15 +92,11 @@ def find_base(
     way = eased(problem)[0]
     eases = found if way == problem else followed(way)
 
-    def by_way_of_rests(each: Valve) -> Valve:
-        return fitter.fit(fitter.evolve(each, way, GENERATIONS, NARROW), problem, SHORT)
-
-    def evolved(each: Valve) -> Valve:
-        return fitter.evolve(each, problem, GENERATIONS, NARROW)
-
-    with ThreadPoolExecutor(os.cpu_count()) as pool:  # compiled runs release the lock
-        found = sorted([*found, *pool.map(by_way_of_rests, eases)], key=by_cost)[:FOLLOWED]
-        found += pool.map(evolved, found)
+    for each in eases:
+        rested = fitter.evolve(each, way, GENERATIONS, NARROW)
+        found.append(fitter.fit(rested, problem, SHORT))
+    found = sorted(found, key=by_cost)[:FOLLOWED]
+    found += [fitter.evolve(each, problem, GENERATIONS, NARROW) for each in found]
     return fitter.refined(min(found, key=by_cost), problem)
 
 
