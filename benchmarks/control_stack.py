@@ -62,6 +62,12 @@ def resident():
     return int(Path('/proc/self/statm').read_text().split()[1]) * os.sysconf('SC_PAGESIZE') / 1e6
 
 
+def stolen():
+    """Return for how long the host kept this machine's cores to itself so far [core seconds]."""
+    ticks = int(Path('/proc/stat').read_text().split(maxsplit=9)[8])
+    return ticks / os.sysconf('SC_CLK_TCK')
+
+
 def spin_for(executor, seconds):
     end = time.monotonic() + seconds
     while time.monotonic() < end:
@@ -86,6 +92,7 @@ def paced(count, rate, seconds, results):
         for times in (plant.late, plant.taken, plant.begun):
             times.clear()
     missed, cpu, begin = [p.missed_periods for p in plants], cpu_seconds(), time.monotonic()
+    steal = stolen()
     spin_for(executor, seconds)
     wall = time.monotonic() - begin
     late, taken = (np.concatenate([getattr(p, n) for p in plants]) for n in ('late', 'taken'))
@@ -95,6 +102,7 @@ def paced(count, rate, seconds, results):
             'missed': sum(p.missed_periods - m for p, m in zip(plants, missed, strict=True)),
             'periods': wall * rate * count,
             'cpu': (cpu_seconds() - cpu) / wall / count,
+            'stolen': (stolen() - steal) / wall / os.cpu_count(),
             'pause': max(np.diff(p.begun).max() for p in plants),
             'late': np.percentile(late, [50, 99, 100]) * 1e6,
             'taken': np.percentile(taken, [50, 99, 100]) * 1e6,
@@ -192,7 +200,10 @@ def say_paced(count, rate, found):
         f'{found["missed"]} of {found["periods"]:.0f} periods missed ({share:.3f} %), '
         f'{100.0 * found["cpu"]:.2f} % of a core per valve'
     )
-    print(f'      longest time between two samples: {1e3 * found["pause"]:.1f} ms')
+    print(
+        f'      longest time between two samples: {1e3 * found["pause"]:.1f} ms; '
+        f'the host kept {100.0 * found["stolen"]:.1f} % of the cores to itself'
+    )
     for name, words in (
         ('late', 'tick after its due time, within the period'),
         ('taken', 'tick to last publish'),

@@ -42,6 +42,7 @@ def small_set(tmp_path_factory):
     return made
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('number', range(len(SMALL_SET)))
 def test_the_hidden_effect_is_named(small_set, number):
     path, key = small_set[number]
@@ -52,6 +53,7 @@ def test_the_hidden_effect_is_named(small_set, number):
     assert found['verdict'] == ('missing_effect' if key['effects'] else 'adequate')
 
 
+@pytest.mark.slow
 def test_the_results_load_and_show_the_effect(small_set, tmp_path):
     path, _ = small_set[0]
     told = CliRunner().invoke(main, ['diagnose', str(path), '--out', str(tmp_path), '--seed', '1'])
@@ -70,6 +72,7 @@ def test_the_results_load_and_show_the_effect(small_set, tmp_path):
     assert (tmp_path / 'decide_by.csv').exists()
 
 
+@pytest.mark.slow
 def test_the_effect_left_out_of_the_catalogue_is_not_named(small_set):
     path, key = small_set[0]
     found = diagnose(path, without=key['effects'])
@@ -77,6 +80,7 @@ def test_the_effect_left_out_of_the_catalogue_is_not_named(small_set):
     assert found.verdict == 'unknown_effect'
 
 
+@pytest.mark.slow
 def test_what_was_found_until_it_is_stopped_is_kept(small_set, tmp_path):
     path, _ = small_set[0]
     asked = []

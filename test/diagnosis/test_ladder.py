@@ -102,6 +102,25 @@ def test_a_first_effect_that_the_second_makes_needless_is_dropped():
     assert rungs[0].after.excess < 0.05
 
 
+@pytest.mark.slow
+def test_a_train_of_slips_is_put_together_from_single_slips():
+    rng = np.random.default_rng(0)
+    time = np.arange(1500) * 0.2
+    u = np.interp(time, np.arange(0.0, 301.0, 50.0), rng.uniform(10.0, 90.0, 7))
+    u[:50] = u[0]
+    stem = {'f_s': 9.5, 'f_d': 6.6, 'a_1': 2340.0, 'a_2': 218.0}
+    effect = {'effects': ['stribeck_friction'], 'stribeck_friction.velocity': 3.7}
+    s = simulate(u, parameters={**STAGES, **stem, **effect})
+    noisy = [each + 0.2 * rng.standard_normal(u.size) for each in (s.p1, s.p2, s.x)]
+    fitter, base = fitted(Recording(s.t, u, *noisy))
+    some = [c for c in STEM.candidates() if c.effect == 'stribeck_friction']
+    best = race(fitter, STEM, base, some)[0]
+    before, after = (leftover(fitter.residuals(each, 'x')).excess for each in (base, best))
+    assert after < 0.05 * before
+    assert best.values['f_s'] == pytest.approx(9.5, rel=0.01)
+    assert best.values['stribeck_friction.velocity'] == pytest.approx(3.7, rel=0.2)
+
+
 def test_a_laborious_effect_does_not_run_where_another_explains_the_signal(monkeypatch):
     fitter, base = fitted(measured(**{'travel_stops.upper': 60.0}))
     screened = racing._screened
@@ -127,6 +146,7 @@ def test_an_effect_found_in_p1_is_not_fitted_anew_to_p2():
     assert found.augmented.values['ip_calibration.span'] == pytest.approx(0.97, abs=0.01)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('outcome', ['adequate', 'unknown_effect'])
 def test_steps_of_x_are_named_where_no_fit_shows_them(outcome):
     """Noise of a third of a step comes out as whole steps, whether the model rounds x or not."""

@@ -29,10 +29,11 @@ MOST_STARTS, FEWER_STARTS = 24, 8
 so many of the best."""
 SCREENED, FINISHERS, REFINED = 3, 5, 2
 """How many starts of a candidate are followed, runners refitted, and refined to the end."""
-GENERATIONS = 30
-"""For how long each start is followed by an evolution where a fit has many valleys."""
-FOLLOWED, DESCENT = 6, 12
-"""So many of the valves that were fitted to single slips are fitted to all, in so many steps."""
+DESCENT, FOLLOWED, TURNS, FINEST = 12, 3, 25, 0.3
+"""Steps of a descent to single slips; so many of its ends are taken on to all slips, by evolutions
+of so many generations that begin with so little spread [steps of unknowns]."""
+FAR_OFF = 1.0
+"""Excess of a caught stem beyond which it is not worth while to let it go."""
 FAR_AHEAD, BEHIND = 0.2, 0.5
 """Where the best leaves no more than this part of the cost, or nothing but noise, runners short of
 more than a part of its gain are not followed."""
@@ -193,7 +194,6 @@ def _screened(
 
     found = best(problem, SCREENED)
     if CATALOGUE[candidate.effect].rugged:
-        found += [fitter.evolve(each, way, GENERATIONS) for each in best(way, SCREENED)]
         found += _slip_by_slip(fitter, there, [one for some in starts for one in some], problem)
     elif way != problem:
         found += [fitter.fit(each, way, SHORT) for each in best(way, 1)]
@@ -214,13 +214,21 @@ def _slip_by_slip(
     apart: dict[tuple[float, ...], list[Mapping[str, float]]] = {}
     names = [unknown.name for unknown in unknowns if unknown.name != 'f_s']
     for start, stem in product(starts, STEMS):
-        there = {**start, **stem}
-        apart.setdefault(tuple(there[name] for name in names), []).append(there)
+        values = {**start, **stem}
+        apart.setdefault(tuple(values[name] for name in names), []).append(values)
     nearest = [fitter.scan(valve, some, alone)[0] for some in apart.values()]
-    each = [fitter.fit(one, alone, DESCENT) for one in nearest]
-    found = sorted(each, key=by_cost)[:FOLLOWED]
-    for way in eased(problem):
-        found = [fitter.fit(each, way, DESCENT) for each in found]
+    each = sorted((fitter.fit(one, alone, DESCENT) for one in nearest), key=by_cost)
+    found: list[Valve] = []
+    for there in each[:FOLLOWED]:
+        for way in (alone, *eased(problem)):
+            there = fitter.evolve(there, way, TURNS, FINEST)
+            excess = leftover(fitter.residuals(there, signal, way[2])).excess
+            if way != alone and excess > FAR_OFF:
+                break
+        else:
+            found.append(fitter.fit(there, problem, DESCENT))
+        if excess <= odds.CLEAN:
+            break
     return found
 
 
