@@ -22,7 +22,7 @@ from valve_sim_ros.diagnosis.proof import closed
 from valve_sim_ros.diagnosis.readings import straightened
 from valve_sim_ros.diagnosis.seen import calibration_seen, friction_seen, mixed_arrivals
 from valve_sim_ros.diagnosis.stages import groups
-from valve_sim_ros.diagnosis.stretch import CAUGHT, HELD, ON_TIME
+from valve_sim_ros.diagnosis.stretch import CAUGHT, HELD, ON_TIME, RESTS
 from valve_sim_ros.diagnosis.unknowns import complete
 from valve_sim_ros.diagnosis.workers import cheapest
 from valve_sim_ros.model.effects import CATALOGUE
@@ -151,8 +151,12 @@ def test_a_coarse_sensor_shows_its_step():
 
     coarse = 1.37 * np.round(record.x / 1.37)
     assert seen(coarse)[0] == pytest.approx(1.37, rel=1e-3)
-    late = coarse + 0.1 * np.random.default_rng(2).standard_normal(coarse.size)
+    late, later = (
+        coarse + noise * np.random.default_rng(2).standard_normal(coarse.size)
+        for noise in (0.1, 0.3)
+    )
     assert seen(late)[0] == pytest.approx(1.37, rel=1e-3)
+    assert seen(later)[0] == pytest.approx(1.37, rel=1e-3)
     assert seen(record.x) == ()
     assert seen(np.round(record.x, 2)) == ()  # as written down, far below the noise
     first = Bench([Recording(record.time, record.u, x=coarse)])
@@ -192,6 +196,23 @@ def test_a_stem_that_is_caught_may_slip_a_little_late():
     right = bench.score(complete(slow), (), 'x')
     assert bench.score(late, (), 'x', (ON_TIME,)) > right + 200.0
     assert bench.score(late, (), 'x', (CAUGHT,)) < right + 20.0
+
+
+@pytest.mark.parametrize('drive', [(), (CAUGHT,), (RESTS,)])
+def test_the_search_for_a_base_valve_comes_to_an_end(drive, monkeypatch):
+    begun = []
+
+    def counted(self, valve, *rest):
+        begun.append(rest)
+        assert len(begun) <= 100
+        return valve
+
+    monkeypatch.setattr(Fitter, 'evolve', counted)
+    record = recording(noise=0.2, **{'vibration.amplitude': 3.0, 'vibration.frequency': 0.15})
+    bench = Bench([record])
+    found = find_base(Fitter(bench), groups(bench.signals)[-1], starting_valve(bench), drive)
+    assert begun
+    assert np.isfinite(found.cost)
 
 
 def test_a_stem_is_where_it_was_seen_until_it_travels():

@@ -91,10 +91,8 @@ def find_base(
     # caught where it is far from its rest, a stem that slips too late is only a little wrong
     way = eased(problem)[0]
     eases = found if way == problem else followed(way)
-
-    for each in eases:
-        rested = fitter.evolve(each, way, GENERATIONS, NARROW)
-        found.append(fitter.fit(rested, problem, SHORT))
+    rested = [fitter.evolve(each, way, GENERATIONS, NARROW) for each in eases]
+    found += [fitter.fit(each, problem, SHORT) for each in rested]
     found = sorted(found, key=by_cost)[:FOLLOWED]
     found += [fitter.evolve(each, problem, GENERATIONS, NARROW) for each in found]
     return fitter.refined(min(found, key=by_cost), problem)

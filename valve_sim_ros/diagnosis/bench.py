@@ -230,12 +230,12 @@ class Bench:
     @cached_property
     def step_of_x(self) -> float:
         """Step on whose multiples all x lie [% of span]; mostly 0."""
-        return coarse_step(self._all_x())
+        return coarse_step(self._all_x(), self.steps_of_x)
 
     @cached_property
     def steps_of_x(self) -> tuple[float, ...]:
-        """Steps to whose multiples x keeps, the likeliest first [% of span]; mostly none."""
-        return steps_kept(self._all_x())
+        """Steps to whose multiples x keeps, the coarsest first [% of span]; mostly none."""
+        return steps_kept(self._all_x(), self.noise.get('x', 0.0))
 
     def _all_x(self) -> Array:
         """Return all measured x, none if x is not measured."""

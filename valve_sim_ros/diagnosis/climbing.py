@@ -57,6 +57,7 @@ def climb_all(
             valve,
             candidates,
             refit=bool(ladders),
+            named=added,
             carried=_carried(ladders),
             progress=_within(tell, share, width, text),
             stops=stops,
@@ -73,6 +74,7 @@ def climb_all(
                 group,
                 ladder.valve,
                 refit=True,
+                named=added,
                 progress=_within(tell, share + width, 0.0, f'{text} again'),
                 stops=stops,
             )

@@ -95,6 +95,7 @@ def climb(
     candidates: Sequence[Candidate],
     *,
     refit: bool,
+    named: bool = False,
     carried: float = 0.0,
     progress: Callable[[float], object],
     stops: tuple[type[BaseException], ...],
@@ -113,6 +114,8 @@ def climb(
         What may be missing.
     refit : bool
         Find the base valve's values in these stages anew.
+    named : bool
+        Whether an effect is named in the stages before: one more needs more evidence.
     carried : float
         Excess that the signals before this one leave: no more than that says nothing.
     progress : callable
@@ -155,10 +158,12 @@ def climb(
             rung = judged(fitter, group, now, before, runners) if worth(before) else None
             if rung is None:
                 break
+            if (named or rungs) and rung.gains[rung.effect] < odds.MORE_ENOUGH:
+                guess = guess or rung
+                break
             if rungs:
-                enough = odds.further(rung.gains[rung.effect], before)
-                both = reconsidered(fitter, group, base, [*rungs, rung]) if enough else rungs
-                if not enough or not odds.needed(base_left, before, rung.closed, both[-1].after):
+                both = reconsidered(fitter, group, base, [*rungs, rung])
+                if not odds.needed(base_left, before, rung.closed, both[-1].after):
                     guess = guess or rung
                     break
                 rungs, rung = both[:-1], both[-1]

@@ -117,11 +117,6 @@ def unfinished(left: Leftover) -> bool:
     return left.excess >= MORE_EXCESS or left.far >= MORE_FAR
 
 
-def further(gained: float, before: Leftover) -> bool:
-    """Tell whether there is evidence for one effect more than those already found."""
-    return gained >= MORE_ENOUGH and unfinished(before)
-
-
 def needed(base: Leftover, before: Leftover, closed: float, after: Leftover) -> bool:
     """Tell whether a further effect closes enough of the gap, `after` being both together."""
     share = base.closed_by(after) - base.closed_by(before)

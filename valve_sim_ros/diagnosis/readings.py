@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a measured signal shows by itself, without a model beside it."""
 
+from collections.abc import Iterable
+
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 import numpy.typing as npt
@@ -10,8 +12,9 @@ from scipy.signal import find_peaks
 
 from ..model.pipeline import Array
 
-FINEST, COARSEST, ON_STEPS, MOST_STEPS = 0.1, 10.0, 0.6, 3
-"""Steps of a coarse sensor [%], how well x keeps to them (1: exactly), and how many are told."""
+FINEST, COARSEST, ON_STEPS, AS_WELL, BLURRED, MOST_STEPS = 0.1, 10.0, 0.6, 0.95, 0.5, 3
+"""Steps of a coarse sensor [%], how well x keeps to them (1: as well as its noise lets it), others
+that it keeps as well [share], the least that noise may leave of that, and how many are told."""
 OFF, ALL, LEAST_STEP, LEAST_VALUES = 0.05, 0.99, 0.3, 4
 """How near to multiples of a coarse sensor's step [steps] nearly all x lie [share]; finer steps
 [%] are a usual resolution, and fewer values may be chance."""
@@ -142,8 +145,8 @@ def shifts_of_steps(u: Array, residual: Array, sensitivity: Array) -> tuple[Rows
     return np.array(told, dtype=np.intp), np.array(shifts)
 
 
-def steps_kept(x: Array) -> tuple[float, ...]:
-    """Return the steps to whose multiples x keeps, the likeliest first [% of span]."""
+def steps_kept(x: Array, noise: float) -> tuple[float, ...]:
+    """Return the steps to whose multiples x keeps but for noise, the coarsest first [%]."""
     x = x[(x >= 0.0) & (x < 100.0)]
     counts = np.histogram(x, round(100.0 / BIN), (0.0, 100.0))[0]
     # 1 where all x are multiples of one over the frequency, near 0 where they are anywhere
@@ -151,17 +154,19 @@ def steps_kept(x: Array) -> tuple[float, ...]:
     frequency = np.fft.rfftfreq(length, BIN)
     middle = np.exp(-1j * np.pi * frequency * BIN)  # of the first bin
     kept = (np.fft.rfft(counts, length) * middle).real / max(x.size, 1)
+    clear = np.maximum(np.exp(-2.0 * (np.pi * noise * frequency) ** 2), BLURRED)
+    kept = np.minimum(kept / clear, 1.0)
     inside = (frequency > 1.0 / COARSEST) & (frequency < 1.0 / FINEST)
     peaks = find_peaks(np.where(inside, kept, 0.0), height=ON_STEPS)[0]
-    alike = np.minimum(kept[peaks], 0.95 * kept[peaks].max(initial=0.0))  # halves of a step
-    likeliest = peaks[np.argsort(-alike, kind='stable')[:MOST_STEPS]]
-    return tuple((1.0 / frequency[likeliest]).tolist())
+    # halves of a step are kept as well as the step
+    alike = peaks[kept[peaks] >= AS_WELL * kept[peaks].max(initial=0.0)]
+    return tuple((1.0 / frequency[alike[:MOST_STEPS]]).tolist())
 
 
-def coarse_step(x: Array) -> float:
+def coarse_step(x: Array, rough_steps: Iterable[float]) -> float:
     """Return the largest step on whose multiples x lies [% of span], 0 if it may be anywhere."""
     found = 0.0
-    for rough in steps_kept(x):
+    for rough in rough_steps:
         step = rough
         for _ in range(2):  # the spectrum knows it less well than its highest multiple does
             multiples = np.round(x / step)

@@ -22,9 +22,9 @@ def force(value: Any, state: Any, p: Any, memory: Any, dt: float) -> tuple[float
 def motion(value: Any, state: Any, p: Any, memory: Any, dt: float) -> Motion:
     """Let the plug rest in its seat at the closed end."""
     stem = value.stem
-    if stem.x >= 0.0:
+    if stem.x >= p[1]:
         return value
-    seated = Stem(0.0, 0.0, 0.0, False)
+    seated = Stem(p[1], 0.0, 0.0, False)
     return moved(value, seated, value.p2)
 
 
@@ -45,7 +45,21 @@ EFFECT = Effect(
             usual=(1.5, 16.0),
             positive=True,
         ),
+        EffectParameter(
+            'seat',
+            'x_s',
+            '%',
+            0.0,
+            -50.0,
+            5.0,
+            'linear',
+            'Opening at which the plug rests in its seat; -50: out of reach',
+            neutral=-50.0,
+            starts=(0.0,),
+            step=0.3,
+        ),
     ),
+    variants=(('pressure',), ('pressure', 'seat')),
     slots={'force_slot': force, 'motion_slot': motion},
     order=20,
     explanation='The spring is compressed at the closed end, or its seat has been readjusted.',
