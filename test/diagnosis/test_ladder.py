@@ -66,16 +66,28 @@ def fitted(record):
 
 
 @pytest.mark.parametrize(
-    ('names', 'after', 'outcome'),
+    ('names', 'before', 'after', 'outcome'),
     [
-        (('travel_stops',), 5.0, 'missing_effect'),
-        (('travel_stops', 'vibration'), 5.0, 'unknown_effect'),
-        (('travel_stops', 'vibration'), 1.0, 'missing_effect'),
-        (('travel_stops',), 20.0, 'unknown_effect'),
+        (('travel_stops',), 50.0, 2.0, 'missing_effect'),
+        (('travel_stops', 'vibration'), 50.0, 2.0, 'unknown_effect'),
+        (('travel_stops', 'vibration'), 50.0, 1.0, 'missing_effect'),
+        (('travel_stops',), 50.0, 5.0, 'unknown_effect'),
+        # where much is left, nearly all must be explained
+        (('travel_stops',), 2000.0, 10.0, 'missing_effect'),
+        (('travel_stops',), 2000.0, 40.0, 'unknown_effect'),
+        # where next to nothing is left, less is enough
+        (('travel_stops',), 0.9, 0.2, 'missing_effect'),
     ],
 )
-def test_two_effects_must_explain_more_than_one(names, after, outcome):
-    assert concluded(ladder_of('adequate', left(50.0), left(after), *names)).outcome == outcome
+def test_two_effects_must_explain_more_than_one(names, before, after, outcome):
+    assert concluded(ladder_of('adequate', left(before), left(after), *names)).outcome == outcome
+
+
+def test_p2_shows_the_part_of_a_dead_time_that_p1_does_not():
+    found = diagnose([measured(**{'ip_dead_time.dead_time': 0.35})])
+    assert [named.rung.effect for named in found.effects] == ['ip_dead_time']
+    values = found.augmented_valve.values
+    assert values['ip_dead_time.dead_time'] - 0.2 * values['phase'] == pytest.approx(0.35, abs=0.02)
 
 
 def test_what_an_effect_named_before_explains_is_not_unknown():

@@ -15,6 +15,9 @@ from .fitting import Fitter, GENERATIONS, NARROW, Valve
 from .ladder import climb, concluded, excused, Ladder
 from .stages import Group
 from .stretch import CAUGHT, HELD, RESTS
+from .unknowns import PHASE
+
+DELAY = 'ip_dead_time'
 
 
 def climb_all(
@@ -86,6 +89,8 @@ def climb_all(
             tell = _stop
         ladders.append(ladder)
         valve = ladder.valve
+        if group.signal == 'p1' and DELAY in valve.effects:
+            fitter.phase = PHASE  # p1 shows a dead time to a sample only, what follows the rest
         if not added:
             names = [unknown.name for unknown in fitter.unknowns(group)]
             found = {name: ladder.base.values[name] for name in names}

@@ -167,7 +167,7 @@ def climb(
                     guess = guess or rung
                     break
                 rungs, rung = both[:-1], both[-1]
-            elif rung.closed < odds.EXPLAINED and rung.after.excess > odds.CLEAN:
+            elif not odds.explained(base_left, rung.after, 1):
                 guess = rung
                 strayed = CATALOGUE[rung.effect].rugged and not PUT_TO_REST & {*fitter.drive}
                 if rung.closed < odds.LEAST_FIRST or strayed:
@@ -304,10 +304,7 @@ def judged(
 
 def concluded(ladder: Ladder) -> Ladder:
     """Return the ladder with its outcome: names only if together they explain the gap."""
-    closed = ladder.before.closed_by(ladder.after)
-    clean = ladder.after.excess <= odds.CLEAN and closed >= odds.LEAST_CLOSED
-    least = odds.EXPLAINED if len(ladder.rungs) == 1 else odds.EXPLAINED_BY_TWO
-    if ladder.rungs and (closed >= least or clean):
+    if ladder.rungs and odds.explained(ladder.before, ladder.after, len(ladder.rungs)):
         return replace(ladder, outcome='missing_effect')
     # what does not explain the gap is not left in the valve either
     plain = replace(ladder, valve=ladder.base, after=ladder.before, rungs=())
@@ -321,7 +318,7 @@ def excused(ladder: Ladder, plain: Leftover) -> Ladder:
 
     Its law is never quite right, and slips tell. `plain` is what the valve without it leaves.
     """
-    explained = plain.closed_by(ladder.before) >= odds.EXPLAINED
+    explained = plain.closed_by(ladder.before) >= odds.MOSTLY
     if ladder.outcome == 'unknown_effect' and explained:
         return replace(ladder, outcome='adequate')
     return ladder

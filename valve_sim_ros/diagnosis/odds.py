@@ -15,8 +15,8 @@ ENOUGH = 25.0
 MORE_ENOUGH, MORE_EXCESS, MORE_CLOSED = 60.0, 0.15, 0.6
 """What a further effect needs: gain, excess before it, and the part of it that it closes."""
 MORE_SHARE, FAR_OFF = 0.02, 2.0
-"""Least part of the whole gap that it closes, unless it leaves nothing but noise; the excess from
-which it may close less of what is left, if both together explain the gap."""
+"""Least part of the whole gap that it closes, unless it leaves nothing but noise; the excess that
+is far more than noise: it may close less of that, if both together explain the gap."""
 MORE_FAR = 10
 """So many errors beyond any noise are as good a reason to look for it as an excess."""
 SPOTLESS = 0.1
@@ -47,11 +47,14 @@ ADEQUATE = {'p1': 0.8, 'p2': 1.2, 'x': 0.8}
 """Excess over the noise that still counts as adequate (other solvers, jitter)."""
 CLEAN = 0.25
 """Excess that counts as noise once an effect is added."""
-EXPLAINED, LEAST_CLOSED = 0.85, 0.5
+EXPLAINED, LEAST_CLOSED = 0.95, 0.5
 """Least part of the excess that a name must close, else the effect is unknown; and where nothing
 but noise is left."""
-EXPLAINED_BY_TWO = 0.97
-"""The same where two effects close it: two that are wrong imitate more than one."""
+EXPLAINED_BY_TWO, EXPLAINED_BUT_FAR = 0.97, 0.99
+"""The same where two effects close it: two that are wrong imitate more than one; and where what is
+left is far more than noise."""
+MOSTLY = 0.85
+"""Part of the excess beside which what is left may be the fault of a law that is not quite right."""
 LEAST_FIRST = 0.1
 """A first effect that closes less than this part of the excess is not followed by a second."""
 TWIN_GAIN, TWIN_SHARE, KNOWN_TWIN_SHARE = 12.0, 0.003, 0.02
@@ -120,10 +123,19 @@ def unfinished(left: Leftover) -> bool:
 def needed(base: Leftover, before: Leftover, closed: float, after: Leftover) -> bool:
     """Tell whether a further effect closes enough of the gap, `after` being both together."""
     share = base.closed_by(after) - base.closed_by(before)
-    left = base.closed_by(before) < EXPLAINED or before.excess > FAR_OFF
-    explained = left and base.closed_by(after) >= EXPLAINED
+    left = base.closed_by(before) < MOSTLY or before.excess > FAR_OFF
+    explained = left and base.closed_by(after) >= MOSTLY
     matters = share >= MORE_SHARE or after.excess <= SPOTLESS
     return matters and (closed >= MORE_CLOSED or explained)
+
+
+def explained(before: Leftover, after: Leftover, names: int) -> bool:
+    """Tell whether so many names explain the gap, so that no effect is unknown."""
+    closed = before.closed_by(after)
+    if after.excess <= CLEAN:
+        return closed >= LEAST_CLOSED
+    least = EXPLAINED if names == 1 else EXPLAINED_BY_TWO
+    return closed >= (EXPLAINED_BUT_FAR if after.excess > FAR_OFF else least)
 
 
 def look_alike(one: str, other: str) -> bool:
