@@ -75,8 +75,12 @@ def fitted(record):
         # where much is left, nearly all must be explained
         (('travel_stops',), 2000.0, 10.0, 'missing_effect'),
         (('travel_stops',), 2000.0, 40.0, 'unknown_effect'),
-        # where next to nothing is left, less is enough
+        # where next to nothing is left, less is enough; any line straightens most of a large gap
         (('travel_stops',), 0.9, 0.2, 'missing_effect'),
+        (('travel_stops',), 10.0, 0.2, 'missing_effect'),
+        (('sensor_calibration',), 0.9, 0.2, 'missing_effect'),
+        (('sensor_calibration',), 10.0, 0.2, 'unknown_effect'),
+        (('sensor_calibration',), 10.0, 0.1, 'missing_effect'),
     ],
 )
 def test_two_effects_must_explain_more_than_one(names, before, after, outcome):
@@ -87,7 +91,8 @@ def test_p2_shows_the_part_of_a_dead_time_that_p1_does_not():
     found = diagnose([measured(**{'ip_dead_time.dead_time': 0.35})])
     assert [named.rung.effect for named in found.effects] == ['ip_dead_time']
     values = found.augmented_valve.values
-    assert values['ip_dead_time.dead_time'] - 0.2 * values['phase'] == pytest.approx(0.35, abs=0.02)
+    late = values['ip_dead_time.dead_time'] - 0.2 * values['phase']
+    assert late == pytest.approx(0.35, abs=0.02)
 
 
 def test_what_an_effect_named_before_explains_is_not_unknown():

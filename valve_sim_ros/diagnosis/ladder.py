@@ -167,7 +167,7 @@ def climb(
                     guess = guess or rung
                     break
                 rungs, rung = both[:-1], both[-1]
-            elif not odds.explained(base_left, rung.after, 1):
+            elif not odds.explained(base_left, rung.after, [rung.effect]):
                 guess = rung
                 strayed = CATALOGUE[rung.effect].rugged and not PUT_TO_REST & {*fitter.drive}
                 if rung.closed < odds.LEAST_FIRST or strayed:
@@ -304,7 +304,8 @@ def judged(
 
 def concluded(ladder: Ladder) -> Ladder:
     """Return the ladder with its outcome: names only if together they explain the gap."""
-    if ladder.rungs and odds.explained(ladder.before, ladder.after, len(ladder.rungs)):
+    names = [rung.effect for rung in ladder.rungs]
+    if names and odds.explained(ladder.before, ladder.after, names):
         return replace(ladder, outcome='missing_effect')
     # what does not explain the gap is not left in the valve either
     plain = replace(ladder, valve=ladder.base, after=ladder.before, rungs=())

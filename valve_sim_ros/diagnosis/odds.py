@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """How strong evidence must be: numbers set on the tuning half of the blind records."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 import math
 
 from ..model.effects import CATALOGUE
@@ -50,11 +50,12 @@ CLEAN = 0.25
 EXPLAINED, LEAST_CLOSED = 0.95, 0.5
 """Least part of the excess that a name must close, else the effect is unknown; and where nothing
 but noise is left."""
-EXPLAINED_BY_TWO, EXPLAINED_BUT_FAR = 0.97, 0.99
-"""The same where two effects close it: two that are wrong imitate more than one; and where what is
-left is far more than noise."""
+EXPLAINED_BY_TWO, EXPLAINED_BUT_FAR, EXPLAINED_LASTING = 0.97, 0.99, 0.985
+"""The same where two effects close it: two that are wrong imitate more than one; where what is
+left is far more than noise; and where a large gap is closed by one that shifts a signal for long:
+a wrong one straightens most of any line."""
 MOSTLY = 0.85
-"""Part of the excess beside which what is left may be the fault of a law that is not quite right."""
+"""Part of the excess beside which the rest may be the fault of a law that is not quite right."""
 LEAST_FIRST = 0.1
 """A first effect that closes less than this part of the excess is not followed by a second."""
 TWIN_GAIN, TWIN_SHARE, KNOWN_TWIN_SHARE = 12.0, 0.003, 0.02
@@ -129,13 +130,17 @@ def needed(base: Leftover, before: Leftover, closed: float, after: Leftover) -> 
     return matters and (closed >= MORE_CLOSED or explained)
 
 
-def explained(before: Leftover, after: Leftover, names: int) -> bool:
-    """Tell whether so many names explain the gap, so that no effect is unknown."""
-    closed = before.closed_by(after)
-    if after.excess <= CLEAN:
-        return closed >= LEAST_CLOSED
-    least = EXPLAINED if names == 1 else EXPLAINED_BY_TWO
-    return closed >= (EXPLAINED_BUT_FAR if after.excess > FAR_OFF else least)
+def explained(before: Leftover, after: Leftover, names: Collection[str]) -> bool:
+    """Tell whether the effects named explain the gap, so that none is unknown."""
+    if after.excess > FAR_OFF:
+        least = EXPLAINED_BUT_FAR
+    elif before.excess > FAR_OFF and not {*names}.isdisjoint(LASTING):
+        least = EXPLAINED_LASTING
+    elif after.excess <= CLEAN:
+        least = LEAST_CLOSED
+    else:
+        least = EXPLAINED if len(names) == 1 else EXPLAINED_BY_TWO
+    return before.closed_by(after) >= least
 
 
 def look_alike(one: str, other: str) -> bool:
