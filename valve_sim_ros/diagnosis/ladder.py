@@ -126,6 +126,7 @@ def climb(
     rungs: list[Rung] = []
     guess = None
     complete = False
+    again = not PUT_TO_REST.isdisjoint(fitter.drive)
 
     def seen(there: Valve) -> tuple[Valve, Leftover]:
         cost = fitter.score(there, group.signal, fitter.drive)
@@ -149,7 +150,7 @@ def climb(
             told = _within(progress, step)
             runners = race(fitter, group, now, candidates, told)
             # in the second look the stem is put to rest already, no valley of the base is missed
-            if group.has_stem and not rungs and not PUT_TO_REST & {*fitter.drive}:
+            if group.has_stem and not rungs and not again:
                 runners = deepened(fitter, group, now, runners, told)
             now = rebased(fitter, group, now, runners[:5])
             before = leftover(fitter.residuals(now, group.signal))
@@ -169,8 +170,9 @@ def climb(
                 rungs, rung = both[:-1], both[-1]
             elif not odds.explained(base_left, rung.after, [rung.effect]):
                 guess = rung
-                strayed = CATALOGUE[rung.effect].rugged and not PUT_TO_REST & {*fitter.drive}
-                if rung.closed < odds.LEAST_FIRST or strayed:
+                if rung.closed < (odds.LEAST_AGAIN if again else odds.LEAST_FIRST):
+                    break
+                if CATALOGUE[rung.effect].rugged and not again:
                     break
             rungs.append(rung)
             now, before = rung.valve, rung.after

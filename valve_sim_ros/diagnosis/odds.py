@@ -56,8 +56,9 @@ left is far more than noise; and where a large gap is closed by one that shifts 
 a wrong one straightens most of any line."""
 MOSTLY = 0.85
 """Part of the excess beside which the rest may be the fault of a law that is not quite right."""
-LEAST_FIRST = 0.1
-"""A first effect that closes less than this part of the excess is not followed by a second."""
+LEAST_FIRST, LEAST_AGAIN = 0.1, 0.35
+"""A first effect that closes less than this part of the excess is not followed by a second; nor in
+a second look, where slips do not hide what is missing."""
 TWIN_GAIN, TWIN_SHARE, KNOWN_TWIN_SHARE = 12.0, 0.003, 0.02
 """Rivals whose gain is less than this, or this share of the gain, behind cannot be excluded; those
 that are declared to look alike need not come as close."""
