@@ -26,6 +26,7 @@ from valve_sim_ros.diagnosis.ladder import (
     reconsidered,
     Rung,
 )
+from valve_sim_ros.diagnosis.odds import explained
 from valve_sim_ros.diagnosis.race import race
 from valve_sim_ros.diagnosis.stages import groups
 from valve_sim_ros.recordings.recording import Recording
@@ -85,6 +86,13 @@ def fitted(record):
 )
 def test_two_effects_must_explain_more_than_one(names, before, after, outcome):
     assert concluded(ladder_of('adequate', left(before), left(after), *names)).outcome == outcome
+
+
+def test_what_is_named_in_p1_leaves_next_to_nothing_but_noise():
+    """A supply limit must not pass for a calibration in a slow loop, which leaves 2 of 200."""
+    assert explained('x', left(200.0), left(1.8), ['positioner_loop'])
+    assert not explained('p1', left(200.0), left(1.8), ['positioner_loop'])
+    assert explained('p1', left(200.0), left(0.5), ['positioner_loop'])
 
 
 def test_p2_shows_the_part_of_a_dead_time_that_p1_does_not():

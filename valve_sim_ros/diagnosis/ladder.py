@@ -168,7 +168,7 @@ def climb(
                     guess = guess or rung
                     break
                 rungs, rung = both[:-1], both[-1]
-            elif not odds.explained(base_left, rung.after, [rung.effect]):
+            elif not odds.explained(group.signal, base_left, rung.after, [rung.effect]):
                 guess = rung
                 if rung.closed < (odds.LEAST_AGAIN if again else odds.LEAST_FIRST):
                     break
@@ -307,11 +307,12 @@ def judged(
 def concluded(ladder: Ladder) -> Ladder:
     """Return the ladder with its outcome: names only if together they explain the gap."""
     names = [rung.effect for rung in ladder.rungs]
-    if names and odds.explained(ladder.before, ladder.after, names):
+    signal = ladder.group.signal
+    if names and odds.explained(signal, ladder.before, ladder.after, names):
         return replace(ladder, outcome='missing_effect')
     # what does not explain the gap is not left in the valve either
     plain = replace(ladder, valve=ladder.base, after=ladder.before, rungs=())
-    if ladder.before.excess > odds.ADEQUATE[ladder.group.signal]:
+    if ladder.before.excess > odds.ADEQUATE[signal]:
         return replace(plain, outcome='unknown_effect')
     return plain
 

@@ -131,8 +131,10 @@ def needed(base: Leftover, before: Leftover, closed: float, after: Leftover) -> 
     return matters and (closed >= MORE_CLOSED or explained)
 
 
-def explained(before: Leftover, after: Leftover, names: Collection[str]) -> bool:
+def explained(signal: str, before: Leftover, after: Leftover, names: Collection[str]) -> bool:
     """Tell whether the effects named explain the gap, so that none is unknown."""
+    if signal == 'p1' and after.excess > ADEQUATE[signal]:
+        return False  # without slips or a chamber's laws the right one leaves noise
     if after.excess > FAR_OFF:
         least = EXPLAINED_BUT_FAR
     elif before.excess > FAR_OFF and not {*names}.isdisjoint(LASTING):
