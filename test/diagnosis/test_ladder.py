@@ -98,9 +98,9 @@ def test_what_is_named_in_p1_leaves_next_to_nothing_but_noise():
 def test_p2_shows_the_part_of_a_dead_time_that_p1_does_not():
     found = diagnose([measured(**{'ip_dead_time.dead_time': 0.35})])
     assert [named.rung.effect for named in found.effects] == ['ip_dead_time']
-    values = found.augmented_valve.values
-    late = values['ip_dead_time.dead_time'] - 0.2 * values['phase']
-    assert late == pytest.approx(0.35, abs=0.02)
+    assert found.augmented.values['ip_dead_time.dead_time'] == pytest.approx(0.35, abs=0.02)
+    low, high = found.effects[0].intervals['ip_dead_time.dead_time']
+    assert (low, high) == pytest.approx((0.15, 0.55), abs=0.02)
 
 
 def test_what_an_effect_named_before_explains_is_not_unknown():

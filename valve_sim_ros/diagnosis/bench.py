@@ -99,6 +99,8 @@ class Bench:
                     # a first slip that was seen on its way must not be put to rest there
                     stretch.begins = np.where(samples < departed - REST, stretch.rests, np.nan)
         self.size = sum(stretch.u.size for stretch in self.stretches)
+        steps = [np.diff(stretch.time) for stretch in self.stretches]
+        self.period = float(np.median(np.concatenate(steps))) if steps else 0.0
 
     def run(
         self,

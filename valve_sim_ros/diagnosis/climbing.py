@@ -7,7 +7,7 @@ from dataclasses import replace
 from functools import partial
 
 from ..identification.watch import Progress, Stop
-from . import odds
+from . import dead_time, odds
 from .adequacy import leftover
 from .base_valve import find_base
 from .coarse import COARSE, rounded
@@ -16,8 +16,6 @@ from .ladder import climb, concluded, excused, Ladder
 from .stages import Group
 from .stretch import CAUGHT, HELD, RESTS
 from .unknowns import PHASE
-
-DELAY = 'ip_dead_time'
 
 
 def climb_all(
@@ -89,7 +87,7 @@ def climb_all(
             tell = _stop
         ladders.append(ladder)
         valve = ladder.valve
-        if group.signal == 'p1' and DELAY in valve.effects:
+        if group.signal == 'p1' and dead_time.EFFECT in valve.effects:
             fitter.phase = PHASE  # p1 shows a dead time to a sample only, what follows the rest
         if not added:
             names = [unknown.name for unknown in fitter.unknowns(group)]

@@ -12,6 +12,7 @@ from ..identification.watch import Progress, Stop
 from ..model.spec import ValveSpec
 from ..recordings import read_recording
 from ..recordings.recording import OUTPUTS, Recording
+from . import dead_time
 from .base_valve import find_base, starting_valve
 from .bench import Bench
 from .climbing import climb_all
@@ -89,6 +90,7 @@ def diagnose(
             'stopped before the base valve was fitted; let it run a little longer'
         ) from None
     ladders, base = climb_all(fitter, parts, valve, without, tell, stops)
+    ladders, late = dead_time.settled(fitter, ladders)
     tell = _heedless(tell)
     augmented = ladders[-1].valve
     tell(0.92, 'holding out')
@@ -99,7 +101,7 @@ def diagnose(
         recordings=tuple(recordings),
         bench=bench,
         ladders=tuple(ladders),
-        effects=_named(fitter, ladders),
+        effects=_named(fitter, ladders, late),
         places=_places(fitter, ladders),
         gaps=gaps,
         base=_spec(base),
@@ -178,13 +180,16 @@ def _known(valve: Valve, spec: ValveSpec | None) -> Valve:
     return replace(valve, values={**valve.values, **values}, effects=spec.effects)
 
 
-def _named(fitter: Fitter, ladders: Sequence[Ladder]) -> tuple[Named, ...]:
-    """Return the effects that were added, with parameters and intervals."""
+def _named(
+    fitter: Fitter, ladders: Sequence[Ladder], known: Mapping[str, tuple[float, float]]
+) -> tuple[Named, ...]:
+    """Return the effects that were added, with parameters and intervals, some of them known."""
     named = []
     for ladder in ladders:
         if ladder.outcome != 'missing_effect':
             continue
-        spans = intervals(fitter, ladder.group, ladder.valve, ladder.after.inflation)
+        found = intervals(fitter, ladder.group, ladder.valve, ladder.after.inflation)
+        spans = {**found, **{name: known[name] for name in known if name in found}}
         for rung in ladder.rungs:
             own = {n: s for n, s in spans.items() if n.startswith(f'{rung.effect}.')}
             named.append(Named(rung, {n: ladder.valve.values[n] for n in own}, own))

@@ -1,6 +1,6 @@
 # Copyright 2026 The valve_sim_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""How well the data know the parameters of the effects that were added."""
+"""How well the data know the parameters of a valve."""
 
 import numpy as np
 
@@ -15,7 +15,7 @@ STEP = 0.3
 def intervals(
     fitter: Fitter, group: Group, valve: Valve, inflation: float
 ) -> dict[str, tuple[float, float]]:
-    """Return 95 % intervals of the added effects' parameters from the curvature of the cost.
+    """Return 95 % intervals of what a refit would vary, from the curvature of the cost.
 
     Parameters
     ----------
@@ -34,7 +34,6 @@ def intervals(
         By full name; the declared range where the data say nothing.
     """
     unknowns, signal, drive = fitter.problem(group, valve)
-    added = group.unknowns_of(valve.candidates)
     point = to_point(unknowns, valve.values)
     moved = []
     for index in range(point.size):
@@ -51,11 +50,8 @@ def intervals(
     variance = float(np.mean(np.clip(residual, -4.0, 4.0) ** 2)) * inflation
     covariance = variance * np.linalg.pinv(jacobian.T @ jacobian, rcond=1e-10)
     spread = 1.96 * np.sqrt(np.maximum(np.diag(covariance), 0.0))
-    found = {}
-    for unknown, at, each in zip(unknowns, point, spread, strict=True):
-        if unknown in added:
-            found[unknown.name] = (
-                unknown.outward(float(at - each)),
-                unknown.outward(float(at + each)),
-            )
-    return found
+    spread[~jacobian.any(axis=0)] = np.inf
+    return {
+        unknown.name: (unknown.outward(float(at - each)), unknown.outward(float(at + each)))
+        for unknown, at, each in zip(unknowns, point, spread, strict=True)
+    }
