@@ -103,6 +103,16 @@ def test_p2_shows_the_part_of_a_dead_time_that_p1_does_not():
     assert (low, high) == pytest.approx((0.15, 0.55), abs=0.02)
 
 
+@pytest.mark.parametrize(('named', 'found'), [(False, ['sensor_lag']), (True, [])])
+def test_little_excess_behind_a_named_effect_is_no_reason_for_another(named, found):
+    fitter, base = fitted(measured(**{'sensor_lag.time_constant': 0.4}))
+    lag = [each for each in STEM.candidates() if each.effect == 'sensor_lag']
+    ladder = climb(
+        fitter, STEM, base, lag, refit=False, named=named, progress=lambda share: None, stops=()
+    )
+    assert [rung.effect for rung in ladder.rungs] == found
+
+
 def test_what_an_effect_named_before_explains_is_not_unknown():
     unknown = ladder_of('unknown_effect', left(1.0), left(1.0))
     assert excused(unknown, left(20.0)).outcome == 'adequate'

@@ -135,9 +135,9 @@ def climb(
     def worth(left: Leftover) -> bool:
         if carried and left.excess <= carried:
             return False
-        if rungs:
-            return odds.unfinished(left)
-        return odds.suspicious(left, group.signal, fitter.bench.mixed)
+        if (rungs or named) and not odds.unfinished(left):
+            return False
+        return bool(rungs) or odds.suspicious(left, group.signal, fitter.bench.mixed)
 
     now, before = base, base_left = seen(valve)
     with suppress(*stops):
