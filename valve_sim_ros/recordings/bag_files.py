@@ -4,7 +4,7 @@
 
 from collections import Counter
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, ExitStack
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 import re
@@ -106,7 +106,7 @@ def opened(path: Path) -> Iterator[Bag]:
     notes += more
     ready: list[StorageFile] = []
     refused = []
-    with TemporaryDirectory(prefix='valve_sim_ros_') as folder:
+    with TemporaryDirectory(prefix='valve_sim_ros_') as folder, ExitStack() as stack:
         for file in files:
             damage: list[str] = []
             try:
@@ -114,7 +114,9 @@ def opened(path: Path) -> Iterator[Bag]:
                 if plain.suffix == '.mcap':
                     ready.append(McapFile(plain))
                 else:
-                    ready.append(SqliteFile(settled(plain, Path(folder))))
+                    database = SqliteFile(settled(plain, Path(folder)))
+                    stack.callback(database.close)
+                    ready.append(database)
             except (RecordingError, OSError) as error:
                 refused.append('; '.join([*damage, str(error)]))
             else:

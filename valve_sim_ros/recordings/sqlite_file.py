@@ -38,11 +38,16 @@ class SqliteFile:
         try:
             self.connections = self._topics()
         except sqlite3.Error as error:
+            self.close()
             raise RecordingError(
                 f'{path.name} is empty, damaged or no bag ({error}); try "sqlite3 {path.name} '
                 '.recover | sqlite3 recovered.db3", or record again'
             ) from None
         self.counts = self._counts()
+
+    def close(self) -> None:
+        """Let go of the file."""
+        self._database.close()
 
     def read(self, columns: Mapping[int, Column]) -> None:
         """Append the messages of some connections to their columns, in stored order."""
