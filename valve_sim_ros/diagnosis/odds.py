@@ -133,9 +133,8 @@ def needed(base: Leftover, before: Leftover, closed: float, after: Leftover) -> 
 
 def explained(signal: str, before: Leftover, after: Leftover, names: Collection[str]) -> bool:
     """Tell whether the effects named explain the gap, so that none is unknown."""
-    if signal == 'p1' and after.excess > ADEQUATE[signal]:
-        return False  # without slips or a chamber's laws the right one leaves noise
-    if after.excess > FAR_OFF:
+    # p1 knows neither slips nor a chamber's laws: there the right one leaves little but noise
+    if after.excess > (ADEQUATE['p1'] if signal == 'p1' else FAR_OFF):
         least = EXPLAINED_BUT_FAR
     elif before.excess > FAR_OFF and not {*names}.isdisjoint(LASTING):
         least = EXPLAINED_LASTING

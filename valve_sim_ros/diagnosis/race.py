@@ -37,6 +37,9 @@ FAR_OFF = 1.0
 FAR_AHEAD, BEHIND = 0.2, 0.5
 """Where the best leaves no more than this part of the cost, or nothing but noise, runners short of
 more than a part of its gain are not followed."""
+NEARLY_ALL = 0.02
+"""What the best may leave of the excess, and nothing but noise at all, where laborious effects
+that do not look like it are not tried."""
 
 Frictions = Sequence[dict[str, float]]
 
@@ -135,7 +138,7 @@ def race(
         laborious = [each for each in candidates if CATALOGUE[each.effect].laborious]
         runners = heat([], [each for each in candidates if each not in laborious])
         best = runners[0] if runners else valve
-        if best.cost < FAR_AHEAD * valve.cost and excess(best) <= odds.SPOTLESS:
+        if excess(best) <= min(odds.SPOTLESS, NEARLY_ALL * excess(valve)):
             effect = best.candidates[-1].effect
             laborious = [each for each in laborious if odds.look_alike(effect, each.effect)]
         elif runners and excess(valve) < FAINT:
