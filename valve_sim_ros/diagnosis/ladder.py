@@ -135,9 +135,11 @@ def climb(
     def worth(left: Leftover) -> bool:
         if carried and left.excess <= carried:
             return False
-        if (rungs or named) and not odds.unfinished(left):
+        if rungs:
+            return odds.unfinished(left, odds.MORE_EXCESS)
+        if named and not odds.unfinished(left, odds.CLEAN):
             return False
-        return bool(rungs) or odds.suspicious(left, group.signal, fitter.bench.mixed)
+        return odds.suspicious(left, group.signal, fitter.bench.mixed)
 
     now, before = base, base_left = seen(valve)
     with suppress(*stops):

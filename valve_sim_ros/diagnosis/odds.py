@@ -46,7 +46,7 @@ LEAST_FAR = 3
 ADEQUATE = {'p1': 0.8, 'p2': 1.2, 'x': 0.8}
 """Excess over the noise that still counts as adequate (other solvers, jitter)."""
 CLEAN = 0.25
-"""Excess that counts as noise once an effect is added."""
+"""Excess that counts as noise once an effect is added (coloured noise leaves up to that)."""
 EXPLAINED, LEAST_CLOSED = 0.95, 0.5
 """Least part of the excess that a name must close, else the effect is unknown; and where nothing
 but noise is left."""
@@ -117,9 +117,9 @@ def size(valve: Valve) -> float:
     return max(sizes, default=1.0)
 
 
-def unfinished(left: Leftover) -> bool:
+def unfinished(left: Leftover, least: float) -> bool:
     """Tell whether what the effects found so far leave makes it worth to look for another."""
-    return left.excess >= MORE_EXCESS or left.far >= MORE_FAR
+    return left.excess >= least or left.far >= MORE_FAR
 
 
 def needed(base: Leftover, before: Leftover, closed: float, after: Leftover) -> bool:
