@@ -38,8 +38,8 @@ FAR_AHEAD, BEHIND = 0.2, 0.5
 """Where the best leaves no more than this part of the cost, or nothing but noise, runners short of
 more than a part of its gain are not followed."""
 NEARLY_ALL = 0.02
-"""What the best may leave of the excess, and nothing but noise at all, where laborious effects
-that do not look like it are not tried."""
+"""What the best may leave of the excess, and no more than noise, where laborious effects that do
+not look like it are not tried."""
 
 Frictions = Sequence[dict[str, float]]
 
@@ -138,10 +138,10 @@ def race(
         laborious = [each for each in candidates if CATALOGUE[each.effect].laborious]
         runners = heat([], [each for each in candidates if each not in laborious])
         best = runners[0] if runners else valve
-        if excess(best) <= min(odds.SPOTLESS, NEARLY_ALL * excess(valve)):
+        if excess(best) <= min(odds.CLEAN, NEARLY_ALL * excess(valve)):
             effect = best.candidates[-1].effect
             laborious = [each for each in laborious if odds.look_alike(effect, each.effect)]
-        elif runners and excess(valve) < FAINT:
+        elif runners and excess(valve) < (odds.MORE_EXCESS if valve.candidates else FAINT):
             laborious = []
         runners = heat(runners, laborious)
         return sorted(pool.map(partial(beside, runners[0]), runners), key=by_cost)
