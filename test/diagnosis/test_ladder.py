@@ -15,6 +15,7 @@ from valve_sim_ros.diagnosis import race as racing
 from valve_sim_ros.diagnosis.adequacy import Leftover, leftover
 from valve_sim_ros.diagnosis.base_valve import starting_valve
 from valve_sim_ros.diagnosis.bench import Bench
+from valve_sim_ros.diagnosis.climbing import _let_go
 from valve_sim_ros.diagnosis.coarse import COARSE, rounded
 from valve_sim_ros.diagnosis.fitting import by_cost, Fitter
 from valve_sim_ros.diagnosis.ladder import (
@@ -26,7 +27,7 @@ from valve_sim_ros.diagnosis.ladder import (
     reconsidered,
     Rung,
 )
-from valve_sim_ros.diagnosis.odds import explained
+from valve_sim_ros.diagnosis.odds import explained, suspicious
 from valve_sim_ros.diagnosis.race import race
 from valve_sim_ros.diagnosis.stages import groups
 from valve_sim_ros.recordings.recording import Recording
@@ -94,6 +95,39 @@ def test_what_is_named_in_p1_must_explain_more():
     assert explained('x', left(100.0), left(1.5), names)
     assert not explained('p1', left(100.0), left(1.5), names)
     assert explained('p1', left(1000.0), left(1.5), names)
+
+
+def test_jitter_may_leave_more_of_p2():
+    assert explained('p2', left(4.4), left(0.4), ['quick_exhaust'])
+    assert not explained('x', left(4.4), left(0.4), ['quick_exhaust'])
+
+
+def test_x_alone_must_leave_more_before_a_name_is_sought():
+    (alone,), stem = groups(('x',)), STEM
+    assert suspicious(left(0.05), stem, False)
+    assert not suspicious(left(0.05), alone, False)
+    assert suspicious(left(0.2), alone, False)
+
+
+def test_what_a_led_stem_hides_is_judged_with_a_free_one():
+    vibration = {'vibration.amplitude': 1.5, 'vibration.frequency': 0.2, 'vibration.phase': 0.3}
+    fitter, base = fitted(measured(**vibration))
+    (candidate,) = (each for each in STEM.candidates() if each.effect == 'vibration')
+    valve = replace(
+        base,
+        values={**base.values, **VALVE, **vibration, 'f_d/f_s': 0.6},
+        effects=('vibration',),
+        candidates=(candidate,),
+    )
+    before = leftover(fitter.residuals(base, 'x'))
+    ladder = Ladder(STEM, 'unknown_effect', base, base, before, before)
+    guess = Rung('vibration', 'p2-x', {'vibration': 1e3}, before, before, 0.75, 0.9, (), valve)
+    found = _let_go(fitter, ladder, guess)
+    assert found.outcome == 'missing_effect'
+    assert found.rungs[0].closed > 0.95
+    assert _let_go(fitter, ladder, replace(guess, closed=0.5)) is None
+    still = replace(valve, values={**valve.values, 'vibration.frequency': 0.05})
+    assert _let_go(fitter, ladder, replace(guess, valve=still)) is None
 
 
 def test_p2_shows_the_part_of_a_dead_time_that_p1_does_not():

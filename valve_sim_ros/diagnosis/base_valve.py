@@ -86,7 +86,7 @@ def find_base(
         return best
     best = fitter.fit(found[0], problem)
     left = leftover(fitter.residuals(best, group.signal, drive))
-    if not odds.suspicious(left, group.signal, fitter.bench.mixed):
+    if not odds.suspicious(left, group, fitter.bench.mixed):
         return best
     # caught where it is far from its rest, a stem that slips too late is only a little wrong
     way = eased(problem)[0]

@@ -12,7 +12,7 @@ from .adequacy import leftover
 from .base_valve import find_base
 from .coarse import COARSE, rounded
 from .fitting import Fitter, GENERATIONS, NARROW, Valve
-from .ladder import climb, concluded, excused, Ladder
+from .ladder import climb, concluded, excused, Ladder, Rung
 from .stages import Group
 from .stretch import CAUGHT, HELD, RESTS
 from .unknowns import PHASE
@@ -93,7 +93,7 @@ def climb_all(
             names = [unknown.name for unknown in fitter.unknowns(group)]
             found = {name: ladder.base.values[name] for name in names}
             base = replace(base, values={**base.values, **found})
-        inexact = group.signal == 'p1' and ladder.after.excess > odds.CLEAN
+        inexact = group.signal == 'p1' and ladder.after.excess > odds.ADEQUATE['p1']
         if ladder.outcome == 'unknown_effect' or inexact:
             # what is wrong here must not be blamed on the stages that follow; a stem that is
             # driven by a noisy p2 would slip at other moments
@@ -125,7 +125,25 @@ def _second_look(fitter: Fitter, ladder: Ladder, again: Callable[[], Ladder]) ->
             return replace(found, valve=valve, base=ladder.base)
         if not complete:
             break
+        if named := _let_go(fitter, ladder, found.best_guess):
+            return named
     return replace(ladder, complete=complete)
+
+
+def _let_go(fitter: Fitter, ladder: Ladder, guess: Rung | None) -> Ladder | None:
+    """Return the ladder with a name that explains x once the stem is free, or None.
+
+    A stem that is put to rest cannot swing: a vibration explains little of it.
+    """
+    if guess is None or guess.closed < odds.LEAST_LED:
+        return None
+    group, before = ladder.group, ladder.before
+    valve = fitter.refined(guess.valve, fitter.problem(group, guess.valve))
+    after = leftover(fitter.residuals(valve, group.signal))
+    closed = before.closed_by(after)
+    rung = replace(guess, valve=valve, before=before, after=after, closed=closed)
+    found = concluded(replace(ladder, valve=valve, after=after, rungs=(rung,)))
+    return found if found.outcome == 'missing_effect' else None
 
 
 def _within(tell: Progress, start: float, width: float, text: str) -> Callable[[float], object]:

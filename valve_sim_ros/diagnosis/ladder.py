@@ -139,7 +139,7 @@ def climb(
             return odds.unfinished(left, odds.MORE_EXCESS)
         if named and not odds.unfinished(left, odds.CLEAN):
             return False
-        return odds.suspicious(left, group.signal, fitter.bench.mixed)
+        return odds.suspicious(left, group, fitter.bench.mixed)
 
     now, before = base, base_left = seen(valve)
     with suppress(*stops):
@@ -161,7 +161,8 @@ def climb(
             rung = judged(fitter, group, now, before, runners) if worth(before) else None
             if rung is None:
                 break
-            if (named or rungs) and rung.gains[rung.effect] < odds.MORE_ENOUGH:
+            weak = rung.gains[rung.effect] < odds.MORE_ENOUGH
+            if (rungs and weak) or (named and (weak or rung.closed < odds.MORE_CLOSED)):
                 guess = guess or rung
                 break
             if rungs:

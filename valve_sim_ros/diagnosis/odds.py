@@ -8,6 +8,7 @@ import math
 from ..model.effects import CATALOGUE
 from .adequacy import Leftover
 from .fitting import Valve
+from .stages import Group
 from .unknowns import declared
 
 ENOUGH = 25.0
@@ -38,18 +39,19 @@ LASTING = (
 LEAST_SHIFT, LEAST_CHANGE = 0.2, 0.015
 """Least mean square that such an effect, and any other, must remove [noise]."""
 LEAST_EXCESS = {'p1': 0.0, 'p2': 0.25, 'x': 0.02}
-LEAST_IF_MIXED = {**LEAST_EXCESS, 'p1': 0.3}
-"""Least excess before a name is sought in a signal, and where commands arrive just as samples are
-taken: the start of each move then scatters by up to a sample, and lags fit that a little."""
+LEAST_IF_MIXED, LEAST_IF_ALONE = {**LEAST_EXCESS, 'p1': 0.3}, 0.1
+"""Least excess before a name is sought in a signal; where commands arrive just as samples are
+taken: the start of each move then scatters by up to a sample, and lags fit that a little; and in x
+if neither p1 nor p2 is measured."""
 LEAST_FAR = 3
 """So many errors of x beyond any noise do as well: a few slips come at another moment."""
 ADEQUATE = {'p1': 0.8, 'p2': 1.2, 'x': 0.8}
 """Excess over the noise that still counts as adequate (other solvers, jitter)."""
 CLEAN = 0.25
 """Excess that counts as noise once an effect is added (coloured noise leaves up to that)."""
-EXPLAINED, LEAST_CLOSED = 0.95, 0.5
-"""Least part of the excess that a name must close, else the effect is unknown; and where nothing
-but noise is left."""
+EXPLAINED, LEAST_CLOSED = {'p1': 0.95, 'p2': 0.9, 'x': 0.95}, 0.5
+"""Least part of the excess that a name must close, else the effect is unknown (jitter leaves more
+of a p2 that moves fast); and where nothing but noise is left."""
 EXPLAINED_BY_TWO, EXPLAINED_BUT_FAR, EXPLAINED_LASTING = 0.97, 0.99, 0.985
 """The same where two effects close it: two that are wrong imitate more than one; where what is
 left is far more than noise; and where a large gap is closed by one that shifts a signal for long:
@@ -59,15 +61,20 @@ MOSTLY = 0.85
 LEAST_FIRST, LEAST_AGAIN = 0.1, 0.35
 """A first effect that closes less than this part of the excess is not followed by a second; nor in
 a second look, where slips do not hide what is missing."""
+LEAST_LED = 0.7
+"""What a name must close of an x whose stem is put to rest, to be tried on a free one."""
 TWIN_GAIN, TWIN_SHARE, KNOWN_TWIN_SHARE = 12.0, 0.003, 0.02
 """Rivals whose gain is less than this, or this share of the gain, behind cannot be excluded; those
 that are declared to look alike need not come as close."""
 
 
-def suspicious(left: Leftover, signal: str, mixed: bool) -> bool:
+def suspicious(left: Leftover, group: Group, mixed: bool) -> bool:
     """Tell whether what the base valve leaves of a signal makes it worth to look for an effect."""
-    least = (LEAST_IF_MIXED if mixed else LEAST_EXCESS)[signal]
-    return left.excess >= least or (signal == 'x' and left.far >= LEAST_FAR)
+    least = (LEAST_IF_MIXED if mixed else LEAST_EXCESS)[group.signal]
+    if group.has_stem:
+        alone = 'u-p1' in group.stages
+        return left.excess >= (LEAST_IF_ALONE if alone else least) or left.far >= LEAST_FAR
+    return left.excess >= least
 
 
 def gain(before: float, after: Valve, inflation: float, count: int) -> float:
@@ -141,7 +148,7 @@ def explained(signal: str, before: Leftover, after: Leftover, names: Collection[
     elif after.excess <= CLEAN:
         least = LEAST_CLOSED
     else:
-        least = EXPLAINED if len(names) == 1 else EXPLAINED_BY_TWO
+        least = EXPLAINED[signal] if len(names) == 1 else EXPLAINED_BY_TWO
     return before.closed_by(after) >= least
 
 
