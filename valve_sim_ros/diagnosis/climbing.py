@@ -3,6 +3,7 @@
 """The ladders of all groups of stages, climbed in the order of the flow."""
 
 from collections.abc import Callable, Collection, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from functools import partial
 
@@ -82,7 +83,9 @@ def climb_all(
             if fitter.bench.step_of_x and any(each.effect == COARSE for each in candidates):
                 ladder = rounded(fitter, ladder, candidates, again)
             elif candidates and ladder.outcome == 'unknown_effect':
-                ladder = _second_look(fitter, ladder, partial(again, candidates))
+                first, ladder = ladder, replace(ladder, complete=False)
+                with suppress(*stops):
+                    ladder = _second_look(fitter, first, partial(again, candidates))
         if not ladder.complete:
             tell = _stop
         ladders.append(ladder)

@@ -161,8 +161,8 @@ def climb(
             rung = judged(fitter, group, now, before, runners) if worth(before) else None
             if rung is None:
                 break
-            weak = rung.gains[rung.effect] < odds.MORE_ENOUGH
-            if (rungs and weak) or (named and (weak or rung.closed < odds.MORE_CLOSED)):
+            part = not rungs and rung.closed < odds.MORE_CLOSED
+            if (rungs or named) and (part or rung.gains[rung.effect] < odds.MORE_ENOUGH):
                 guess = guess or rung
                 break
             if rungs:
