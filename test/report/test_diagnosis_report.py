@@ -1,0 +1,26 @@
+# Copyright 2026 The valve_sim_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The page of a diagnosis."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from valve_sim_ros import simulate
+from valve_sim_ros.diagnosis import diagnose
+from valve_sim_ros.recordings.recording import Recording
+from valve_sim_ros.report.diagnosis import report
+
+
+def test_a_name_beside_an_unknown_effect_is_said_first():
+    u = np.repeat(np.random.default_rng(5).uniform(10.0, 90.0, 30), 50)
+    delay = {'effects': ['ip_dead_time'], 'ip_dead_time.dead_time': 0.7}
+    s = simulate(u, parameters={'f_s': 4.0, 'f_d': 2.4, **delay})
+    noise = 0.2 * np.random.default_rng(1).standard_normal((3, u.size))
+    rows = np.array([s.p1, s.p2, s.x]) + noise
+    found = diagnose(Recording(s.t, u, *rows))
+    assert 'With ip_dead_time added it does' in report(found)
+    *others, last = found.ladders
+    page = report(replace(found, ladders=(*others, replace(last, outcome='unknown_effect'))))
+    assert 'no effect of the catalogue explains it' in page
+    assert 'In other stages it can be named: ip_dead_time' in page
