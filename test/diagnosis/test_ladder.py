@@ -27,7 +27,7 @@ from valve_sim_ros.diagnosis.ladder import (
     reconsidered,
     Rung,
 )
-from valve_sim_ros.diagnosis.odds import explained, suspicious
+from valve_sim_ros.diagnosis.odds import explained, strong, suspicious
 from valve_sim_ros.diagnosis.race import race
 from valve_sim_ros.diagnosis.stages import groups
 from valve_sim_ros.recordings.recording import Recording
@@ -100,6 +100,24 @@ def test_what_is_named_in_p1_must_explain_more():
 def test_jitter_may_leave_more_of_p2():
     assert explained('p2', left(4.4), left(0.4), ['quick_exhaust'])
     assert not explained('x', left(4.4), left(0.4), ['quick_exhaust'])
+
+
+@pytest.mark.parametrize(
+    ('excess', 'gained', 'closed', 'named', 'enough'),
+    [
+        (0.14, 335.0, 1.0, False, True),
+        (0.14, 335.0, 0.63, False, False),
+        (0.14, 30.0, 1.0, False, False),
+        (0.5, 30.0, 0.5, False, True),
+        (0.5, 30.0, 1.0, True, False),
+        (0.5, 335.0, 0.63, True, True),
+    ],
+)
+def test_a_little_excess_of_p2_is_named_if_one_effect_closes_it(
+    excess, gained, closed, named, enough
+):
+    found = strong('p2', left(excess), gained, closed, first=True, named=named)
+    assert found == enough
 
 
 def test_x_alone_must_leave_more_before_a_name_is_sought():

@@ -161,8 +161,10 @@ def climb(
             rung = judged(fitter, group, now, before, runners) if worth(before) else None
             if rung is None:
                 break
-            part = not rungs and rung.closed < odds.MORE_CLOSED
-            if (rungs or named) and (part or rung.gains[rung.effect] < odds.MORE_ENOUGH):
+            gained, first = rung.gains[rung.effect], not rungs
+            if not odds.strong(
+                group.signal, before, gained, rung.closed, first=first, named=named
+            ):
                 guess = guess or rung
                 break
             if rungs:

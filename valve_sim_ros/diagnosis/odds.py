@@ -38,11 +38,14 @@ LASTING = (
 """Effects that shift a signal for long: small ones are nothing but the bias of a fit."""
 LEAST_SHIFT, LEAST_CHANGE = 0.2, 0.015
 """Least mean square that such an effect, and any other, must remove [noise]."""
-LEAST_EXCESS = {'p1': 0.0, 'p2': 0.25, 'x': 0.02}
+LEAST_EXCESS = {'p1': 0.0, 'p2': 0.02, 'x': 0.02}
 LEAST_IF_MIXED, LEAST_IF_ALONE = {**LEAST_EXCESS, 'p1': 0.3}, 0.1
 """Least excess before a name is sought in a signal; where commands arrive just as samples are
 taken: the start of each move then scatters by up to a sample, and lags fit that a little; and in x
 if neither p1 nor p2 is measured."""
+SLIGHT, SLIGHT_CLOSED = {'p1': 0.0, 'p2': 0.25, 'x': 0.0}, 0.8
+"""Excess below which a name needs as much gain as a further one and must close this part of it:
+jitter leaves as much of p2, and a quick exhaust fits that a little."""
 LEAST_FAR = 3
 """So many errors of x beyond any noise do as well: a few slips come at another moment."""
 ADEQUATE = {'p1': 0.8, 'p2': 1.2, 'x': 0.8}
@@ -127,6 +130,21 @@ def size(valve: Valve) -> float:
 def unfinished(left: Leftover, least: float) -> bool:
     """Tell whether what the effects found so far leave makes it worth to look for another."""
     return left.excess >= least or left.far >= MORE_FAR
+
+
+def strong(
+    signal: str, before: Leftover, gained: float, closed: float, *, first: bool, named: bool
+) -> bool:
+    """Tell whether the evidence is enough where there is less reason to look for an effect.
+
+    Behind another one, in this group of stages or (`named`) in those before, or if the base valve
+    leaves little.
+    """
+    slight = before.excess < SLIGHT[signal]
+    if first and not named and not slight:
+        return True
+    least = 0.0 if not first else SLIGHT_CLOSED if slight else MORE_CLOSED
+    return gained >= MORE_ENOUGH and closed >= least
 
 
 def needed(base: Leftover, before: Leftover, closed: float, after: Leftover) -> bool:
