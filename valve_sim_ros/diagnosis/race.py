@@ -141,7 +141,7 @@ def race(
         if excess(best) <= min(odds.CLEAN, NEARLY_ALL * excess(valve)):
             effect = best.candidates[-1].effect
             laborious = [each for each in laborious if odds.look_alike(effect, each.effect)]
-        elif runners and excess(valve) < (odds.MORE_EXCESS if valve.candidates else FAINT):
+        elif runners and excess(valve) < (odds.CLEAN if valve.candidates else FAINT):
             laborious = []
         runners = heat(runners, laborious)
         return sorted(pool.map(partial(beside, runners[0]), runners), key=by_cost)
