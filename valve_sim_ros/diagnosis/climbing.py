@@ -53,6 +53,7 @@ def climb_all(
         if 'x' in fitter.bench.signals and not group.has_stem:
             # the stem may act on these stages: a positioner, the chamber's volume
             fitter.drive = (*drive, HELD)
+        carried = max((each.after.excess for each in ladders), default=0.0)
         ladder = climb(
             fitter,
             group,
@@ -60,13 +61,13 @@ def climb_all(
             candidates,
             refit=bool(ladders),
             named=added,
-            carried=_carried(ladders),
+            carried=carried,
             progress=_within(tell, share, width, text),
             stops=stops,
         )
         fitter.drive = drive
         ladder = concluded(ladder)
-        if added and not _carried(ladders):
+        if added and carried <= odds.CLEAN:
             plain = leftover(fitter.residuals(base, group.signal, ()))
             ladder = excused(ladder, plain)
         if group.has_stem and ladder.complete:
@@ -103,12 +104,6 @@ def climb_all(
             fitter.drive = (*fitter.drive, group.signal)
     fitter.drive = ()
     return ladders, base
-
-
-def _carried(ladders: Sequence[Ladder]) -> float:
-    """Return the most that the signals before leave, if that is more than next to nothing."""
-    left = [ladder.after.excess for ladder in ladders]
-    return max((excess for excess in left if excess > odds.CLEAN), default=0.0)
 
 
 def _second_look(fitter: Fitter, ladder: Ladder, again: Callable[[], Ladder]) -> Ladder:

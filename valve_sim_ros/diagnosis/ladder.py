@@ -117,7 +117,8 @@ def climb(
     named : bool
         Whether an effect is named in the stages before: one more needs more evidence.
     carried : float
-        Excess that the signals before this one leave: no more than that says nothing.
+        Excess that the signals before this one leave: if that is more than noise, no more than
+        that says nothing.
     progress : callable
         Called with the share done.
     stops : tuple of type
@@ -133,7 +134,7 @@ def climb(
         return replace(there, cost=cost), leftover(fitter.residuals(there, group.signal))
 
     def worth(left: Leftover) -> bool:
-        if carried and left.excess <= carried:
+        if carried > odds.SPOTLESS and left.excess <= carried:
             return False
         if rungs:
             return odds.unfinished(left, odds.MORE_EXCESS)

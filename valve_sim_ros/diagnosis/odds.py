@@ -38,7 +38,7 @@ LASTING = (
 """Effects that shift a signal for long: small ones are nothing but the bias of a fit."""
 LEAST_SHIFT, LEAST_CHANGE = 0.2, 0.015
 """Least mean square that such an effect, and any other, must remove [noise]."""
-LEAST_EXCESS = {'p1': 0.0, 'p2': 0.02, 'x': 0.02}
+LEAST_EXCESS = {'p1': 0.0, 'p2': 0.1, 'x': 0.02}
 LEAST_IF_MIXED, LEAST_IF_ALONE = {**LEAST_EXCESS, 'p1': 0.3}, 0.1
 """Least excess before a name is sought in a signal; where commands arrive just as samples are
 taken: the start of each move then scatters by up to a sample, and lags fit that a little; and in x

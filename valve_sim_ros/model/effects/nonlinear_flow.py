@@ -88,6 +88,7 @@ EFFECT = Effect(
             'linear',
             'Flow grows with this power of p1 - p2; 0.5 is turbulent, 1 laminar',
             neutral=1.0,
+            usual=(0.15, 0.75),
         ),
         EffectParameter(
             'critical_ratio',

@@ -41,6 +41,7 @@ EFFECT = Effect(
             'How much faster p2 falls above the threshold',
             neutral=1.0,
             starts=(2.0, 5.0),
+            usual=(0.8, 6.0),
         ),
         EffectParameter(
             'threshold',
