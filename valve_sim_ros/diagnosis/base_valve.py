@@ -5,14 +5,12 @@
 from collections.abc import Sequence
 from dataclasses import replace
 
-import numpy as np
-
 from . import odds
 from .adequacy import leftover
+from .arrivals import put_in_its_period
 from .bench import Bench, MIXED_JITTER
 from .fitting import by_cost, eased, Fitter, NARROW, Problem, SHORT, Valve
-from .readings import shifts_of_steps
-from .seen import ENOUGH_STEPS, friction_seen, LEAST_EACH, mixed_arrivals
+from .seen import friction_seen, mixed_arrivals
 from .stages import Group
 from .starts import friction_grid, grid, START, STEMS
 from .unknowns import EARLY, LATE, PHASE
@@ -21,8 +19,6 @@ FEW_STARTS = 3
 """So many starts are followed."""
 FOLLOWED, GENERATIONS = 4, 30
 """So many base valves are followed by an evolution where costs are rugged, and for how long."""
-WHOLE, MOST = 0.2, 0.8
-"""So near to a whole period, and so many of the steps."""
 NEARLY = 0.95
 """Phase beyond which a command acts nearly a whole period late or early."""
 
@@ -80,10 +76,7 @@ def find_base(
         return found[0]
     if not group.has_stem:
         best = fitter.refined(found[0], problem)
-        hears_u = 'p1-p2' in group.stages and 'p1' not in drive
-        if hears_u and _each_step_in_its_period(fitter, best, problem):
-            best = fitter.refined(best, problem)
-        return best
+        return put_in_its_period(fitter, group, best, problem)
     best = fitter.fit(found[0], problem)
     left = leftover(fitter.residuals(best, group.signal, drive))
     if not odds.suspicious(left, group, fitter.bench.mixed):
@@ -96,34 +89,6 @@ def find_base(
     found = sorted(found, key=by_cost)[:FOLLOWED]
     found += [fitter.evolve(each, problem, GENERATIONS, NARROW) for each in found]
     return fitter.refined(min(found, key=by_cost), problem)
-
-
-def _each_step_in_its_period(fitter: Fitter, valve: Valve, problem: Problem) -> bool:
-    """Put steps of the command a sample earlier that came a whole period before the others.
-
-    Where samples are taken just when commands arrive, nobody sees on which side of a sample a step
-    was; what follows shows it. Tells whether any was put elsewhere.
-    """
-    _, signal, drive = problem
-    stretches, phase = fitter.bench.stretches, valve.values['phase']
-    move = -0.1 if phase > 0.5 else 0.1
-    moved = replace(valve, values={**valve.values, 'phase': phase + move})
-    residual = fitter.residuals(valve, signal, drive)
-    sensitivity = (residual - fitter.residuals(moved, signal, drive)) / move
-    ends = np.cumsum([stretch.u.size for stretch in stretches])[:-1]
-    parts = zip(stretches, np.split(residual, ends), np.split(sensitivity, ends), strict=True)
-    each = [shifts_of_steps(stretch.u, *part) for stretch, *part in parts]
-    shifts = phase + np.concatenate([shifts for _, shifts in each])
-    early, on_time = (np.abs(shifts - whole) < WHOLE for whole in (1.0, 0.0))
-    if (
-        shifts.size < ENOUGH_STEPS
-        or min(early.sum(), on_time.sum()) < LEAST_EACH
-        or np.mean(early | on_time) < MOST
-    ):
-        return False
-    for stretch, (steps, shifts) in zip(stretches, each, strict=True):
-        stretch.put_earlier(steps[np.abs(phase + shifts - 1.0) < WHOLE])
-    return True
 
 
 def _settle_phase(fitter: Fitter, group: Group, valve: Valve) -> None:

@@ -10,6 +10,7 @@ from typing import Literal
 from ..model.effects import CATALOGUE
 from . import odds
 from .adequacy import Leftover, leftover
+from .arrivals import put_in_its_period
 from .base_valve import find_base
 from .fitting import by_cost, Fitter, Valve
 from .race import FAR_AHEAD, in_reach, race, rebased
@@ -162,6 +163,7 @@ def climb(
             rung = judged(fitter, group, now, before, runners) if worth(before) else None
             if rung is None:
                 break
+            rung = _on_time(fitter, group, rung)
             gained, first = rung.gains[rung.effect], not rungs
             if not odds.strong(
                 group.signal, before, gained, rung.closed, first=first, named=named
@@ -187,6 +189,13 @@ def climb(
         complete = True
     after = leftover(fitter.residuals(now, group.signal))
     return Ladder(group, 'adequate', base, now, base_left, after, tuple(rungs), guess, complete)
+
+
+def _on_time(fitter: Fitter, group: Group, rung: Rung) -> Rung:
+    """Return a step with commands where its valve shows that they came."""
+    valve = put_in_its_period(fitter, group, rung.valve, fitter.problem(group, rung.valve))
+    after = leftover(fitter.residuals(valve, group.signal))
+    return replace(rung, valve=valve, after=after, closed=rung.before.closed_by(after))
 
 
 def deepened(

@@ -30,8 +30,6 @@ of the command beyond which x may bend [%]."""
 LARGE, UNMOVED, ANSWERED = 16.0, 4.0, 0.5
 """A step of p1 that tells when it came; p1 has not moved yet; and part of it seen at once [noise,
 noise, share]."""
-AFTER, SURE = 30, 0.1
-"""Samples after a step that show when it came, and the error with which they must [periods]."""
 Mask = npt.NDArray[np.bool_]
 Rows = npt.NDArray[np.intp]
 
@@ -115,34 +113,6 @@ def answers_to_steps(u: Array, p1: Array, noise: float) -> tuple[int, int]:
     large = both > LARGE * noise
     late = large & (first < UNMOVED * noise)
     return int(late.sum()), int((large & (first > ANSWERED * both)).sum())
-
-
-def shifts_of_steps(u: Array, residual: Array, sensitivity: Array) -> tuple[Rows, Array]:
-    """Return by how much each single step of the command came earlier than a model has it.
-
-    Parameters
-    ----------
-    u, residual : ndarray, shape (n,)
-        Command, and what the model leaves of a signal over its noise.
-    sensitivity : ndarray, shape (n,)
-        By how much the model's signal grows over its noise if commands come earlier by one unit.
-
-    Returns
-    -------
-    steps : ndarray, shape (m,)
-        Samples at which those steps are that show it well enough.
-    shifts : ndarray, shape (m,)
-        In that unit.
-    """
-    steps = np.flatnonzero(np.diff(u)) + 1
-    told, shifts = [], []
-    for step, end in zip(steps, np.append(steps[1:], u.size), strict=True):
-        part = slice(step, min(end, step + AFTER))
-        weight = float(np.sum(sensitivity[part] ** 2))
-        if end - step >= FEW and weight > SURE**-2:
-            told.append(step)
-            shifts.append(float(residual[part] @ sensitivity[part]) / weight)
-    return np.array(told, dtype=np.intp), np.array(shifts)
 
 
 def steps_kept(x: Array, noise: float) -> tuple[float, ...]:

@@ -46,7 +46,8 @@ class Stretch:
     `counts` are the measured outputs where they count, `noise` their uncertainty, `rests` x
     where it rests, `begins` the same until the stem first moves: there it is always put, since
     nobody knows what held it before. `speed` is that of a stem that moves at the beginning [%/s],
-    `held` is x smoothed between its slips.
+    `held` is x smoothed between its slips. `shown` are the commands of the recording, where `u`
+    are those that the valve is taken to have received.
     """
 
     time: Array
@@ -59,6 +60,10 @@ class Stretch:
     speed: float = 0.0
     held: Array = field(default_factory=lambda: np.empty(0))
     _grids: dict[Any, Grid] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        """Keep the commands as the recording shows them."""
+        self.shown = self.u
 
     @cached_property
     def first(self) -> dict[str, float]:
@@ -92,14 +97,18 @@ class Stretch:
         self.counts = dict(counts)
         self._grids.clear()
 
+    def send(self, u: Array) -> None:
+        """Let the valve receive other commands than the recording shows."""
+        self.u = u
+        self._grids.clear()
+
     def put_earlier(self, steps: Rows) -> None:
-        """Let steps of the command come a sample earlier; p1 does not count there any more."""
-        self.u[steps - 1] = self.u[steps]
+        """Let recorded steps of the command come a sample earlier, where p1 no more counts."""
         for each in (self.measured, self.counts):
             if 'p1' in each:
                 each['p1'] = each['p1'].copy()
                 each['p1'][steps - 1] = np.nan
-        self._grids.clear()
+        self.send(earlier(self.shown, steps))
 
     def _moved(self, phase: float, drive: tuple[str, ...]) -> Grid:
         n = self.time.size
@@ -145,6 +154,13 @@ class Stretch:
             scales,
             nothing,
         )
+
+
+def earlier(u: Array, steps: Rows) -> Array:
+    """Return commands with some steps a sample earlier."""
+    sent = u.copy()
+    sent[steps - 1] = u[steps]
+    return sent
 
 
 def _beginning(values: Array, noise: float) -> float:
