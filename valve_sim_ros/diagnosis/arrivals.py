@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """On which side of a sample each command came, where p1 does not show it."""
 
+import math
+
 import numpy as np
 
 from ..model.pipeline import Array
@@ -9,10 +11,12 @@ from ..recordings.recording import OUTPUTS
 from .fitting import Fitter, Problem, Valve
 from .seen import ENOUGH_STEPS, LEAST_EACH
 from .stages import Group
-from .stretch import earlier, Rows, Stretch
+from .stretch import Rows, shifted, Stretch
 
 WHOLE, MOST = 0.3, 0.8
 """So near to a whole period, and so many of the steps."""
+RARE = 1 / 3
+"""Those on time are late where they are so few beside the early ones."""
 SURE = 0.25
 """The error with which a step must be told [periods]."""
 LEAST_PUSH, MOST_CELLS = 1.0, 5e6
@@ -21,7 +25,7 @@ samples times steps than so many."""
 
 
 def put_in_its_period(fitter: Fitter, group: Group, valve: Valve, problem: Problem) -> Valve:
-    """Put steps of the command a sample earlier that came a whole period before the others.
+    """Put steps of the command a sample elsewhere that came a whole period beside most others.
 
     Where samples are taken just when commands arrive, nobody sees on which side of a sample a step
     was; p2 shows it. Returns the valve, refitted if any was put elsewhere.
@@ -31,22 +35,27 @@ def put_in_its_period(fitter: Fitter, group: Group, valve: Valve, problem: Probl
     stretches = fitter.bench.stretches
     sent = [stretch.u for stretch in stretches]
     each = shifts_of_steps(fitter, valve, problem)
-    shifts = np.concatenate([shifts for _, shifts in each])
-    early, on_time = (np.abs(shifts - whole) < WHOLE for whole in (1.0, 0.0))
+    told = np.concatenate([shifts[errors < SURE] for _, shifts, errors in each])
+    early, on_time = (int(np.sum(np.abs(told - whole) < WHOLE)) for whole in (1.0, 0.0))
     if (
-        shifts.size < ENOUGH_STEPS
-        or min(early.sum(), on_time.sum()) < LEAST_EACH
-        or np.mean(early | on_time) < MOST
+        told.size < ENOUGH_STEPS
+        or min(early, on_time) < LEAST_EACH
+        or early + on_time < MOST * told.size
     ):
         for stretch, u in zip(stretches, sent, strict=True):
             stretch.send(u)
         return valve
-    for stretch, (steps, shifts) in zip(stretches, each, strict=True):
-        stretch.put_earlier(steps[shifts > 0.5])
+    sooner = on_time > RARE * early
+    for stretch, (steps, shifts, errors) in zip(stretches, each, strict=True):
+        # those that are hardly told stay with the most
+        likelier_early = (shifts - 0.5) / errors**2 + math.log(early / on_time) > 0.0
+        stretch.put(steps[likelier_early == sooner], sooner)
     return fitter.refined(valve, problem)
 
 
-def shifts_of_steps(fitter: Fitter, valve: Valve, problem: Problem) -> list[tuple[Rows, Array]]:
+def shifts_of_steps(
+    fitter: Fitter, valve: Valve, problem: Problem
+) -> list[tuple[Rows, Array, Array]]:
     """Return by how much steps of the command came earlier than at the sample that shows them.
 
     All are told at once: behind a slow chamber what one leaves is still there when others come.
@@ -63,9 +72,9 @@ def shifts_of_steps(fitter: Fitter, valve: Valve, problem: Problem) -> list[tupl
 
     Returns
     -------
-    list of (ndarray, ndarray), shape (m,) each
-        By stretch: samples that are the first to show a step, of those that are told well enough,
-        and their shifts [periods].
+    list of (ndarray, ndarray, ndarray), shape (m,) each
+        By stretch: samples that are the first to show a large step, and their shifts with standard
+        errors [periods].
     """
     _, signal, drive = problem
     stretches, row = fitter.bench.stretches, OUTPUTS.index(signal)
@@ -74,7 +83,7 @@ def shifts_of_steps(fitter: Fitter, valve: Valve, problem: Problem) -> list[tupl
     def results(moved: int) -> list[Array]:
         """Return the signal of all stretches with one step of each a sample earlier, -1: none."""
         for stretch, own in zip(stretches, steps, strict=True):
-            stretch.send(earlier(stretch.shown, own[moved : moved + 1]))
+            stretch.send(shifted(stretch.shown, own[moved : moved + 1], True))
         return [result[row] for result in fitter.results(valve, drive)]
 
     moved = [results(index) for index in range(max(own.size for own in steps))]
@@ -90,9 +99,9 @@ def shifts_of_steps(fitter: Fitter, valve: Valve, problem: Problem) -> list[tupl
         there = np.array(changes).reshape(own.size, weight.size)
         # one may be a period off: what the signal does not tell stays where it is
         covariance = np.linalg.inv(there @ there.T + np.eye(own.size))
-        told = np.sqrt(np.diag(covariance)) < SURE
-        shifts = valve.values['phase'] + covariance @ (there @ residual)
-        found.append((own[told], shifts[told]))
+        kept = np.minimum(np.diag(covariance), 1.0 - 1e-9)
+        shifts = valve.values['phase'] + covariance @ (there @ residual) / (1.0 - kept)
+        found.append((own, shifts, np.sqrt(kept / (1.0 - kept))))
     return found
 
 

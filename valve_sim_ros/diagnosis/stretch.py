@@ -102,13 +102,13 @@ class Stretch:
         self.u = u
         self._grids.clear()
 
-    def put_earlier(self, steps: Rows) -> None:
-        """Let recorded steps of the command come a sample earlier, where p1 no more counts."""
+    def put(self, steps: Rows, sooner: bool) -> None:
+        """Let recorded steps of the command come a sample earlier or later, unseen in p1 there."""
         for each in (self.measured, self.counts):
             if 'p1' in each:
                 each['p1'] = each['p1'].copy()
-                each['p1'][steps - 1] = np.nan
-        self.send(earlier(self.shown, steps))
+                each['p1'][steps - sooner] = np.nan
+        self.send(shifted(self.shown, steps, sooner))
 
     def _moved(self, phase: float, drive: tuple[str, ...]) -> Grid:
         n = self.time.size
@@ -156,10 +156,10 @@ class Stretch:
         )
 
 
-def earlier(u: Array, steps: Rows) -> Array:
-    """Return commands with some steps a sample earlier."""
+def shifted(u: Array, steps: Rows, sooner: bool) -> Array:
+    """Return commands with some steps a sample earlier or later."""
     sent = u.copy()
-    sent[steps - 1] = u[steps]
+    sent[steps - sooner] = u[steps - 1 + sooner]
     return sent
 
 
