@@ -13,7 +13,7 @@ from .seen import ENOUGH_STEPS, LEAST_EACH
 from .stages import Group
 from .stretch import Rows, shifted, Stretch
 
-WHOLE, MOST = 0.3, 0.8
+WHOLE, MOST = 0.3, 0.7
 """So near to a whole period, and so many of the steps."""
 RARE = 1 / 3
 """Those on time are late where they are so few beside the early ones."""
