@@ -323,10 +323,11 @@ def test_single_steps_of_the_command_show_whether_arrivals_are_mixed():
         assert mixed_arrivals(bench, wrong) == mixed
 
 
-def test_a_command_that_always_moves_shows_it_too_and_no_lag_passes_for_chance():
+@pytest.mark.parametrize('rms', [0.1, 0.6])  # moves of up to 13 or 2.2 times the noise
+def test_a_command_that_always_moves_shows_it_too_and_no_lag_passes_for_chance(rms):
     rng = np.random.default_rng(8)
     u = 50.0 + 40.0 * np.sin(np.arange(3000) / 30.0)
-    noise = 0.1 * rng.standard_normal(3000)
+    noise = rms * rng.standard_normal(3000)
     last = np.roll(u, 1)
     some = np.where(rng.random(3000) < 0.3, last, u)
     lagging = lfilter([0.5], [1.0, -0.5], u - u[0]) + u[0]

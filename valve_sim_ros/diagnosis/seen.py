@@ -13,11 +13,13 @@ from .readings import answers_to_steps
 
 ENOUGH_STEPS, LEAST_EACH = 6, 2
 """From so many single steps of the command on, so many late and on time tell of mixed arrivals."""
-TOLD, ALIKE, LEAST_PAIRS = 3.0, 0.2, 40
+TOLD, ALIKE, LEAST_PAIRS = 1.5, 0.2, 40
 """Else pairs of moves of p1 from sample to sample tell, larger than this [noise] and alike."""
-WITHIN, BY_CHANCE = 0.9, 0.05
-"""Least part of such moves of which all or a part may be missing, but no more; and the share of
-their square that scatters: 5 in 100 late come to it."""
+WITHIN, SLACK = 0.9, 3.0
+"""Least part of such moves of which all or a part may be missing, but no more [noise]."""
+BY_CHANCE, SURE = 0.05, 3.0
+"""The share of their square that scatters (5 in 100 late come to it), and by how many standard
+errors of what the noise scatters it must be more."""
 SPANS = tuple(np.geomspace(0.7, 1.4, 50).tolist())
 """Spans of the sensor that are tried."""
 LEAST_RESTS = 20
@@ -87,7 +89,8 @@ def mixed_arrivals(bench: Bench, results: Sequence[Array]) -> bool:
         moves += float(np.sum(square[told]))
         pairs += int(told.sum())
         part = missing * np.sign(step)
-        inside = np.maximum(-part, part - np.abs(step)) <= TOLD * noise
+        inside = np.maximum(-part, part - np.abs(step)) <= SLACK * noise
         within += int(np.sum(told & inside[1:]))
     enough = pairs >= LEAST_PAIRS and within > WITHIN * pairs
-    return enough and scatter > BY_CHANCE * moves
+    by_noise = SURE * noise**2 * math.sqrt(8.0 * pairs)
+    return enough and scatter > BY_CHANCE * moves + by_noise
