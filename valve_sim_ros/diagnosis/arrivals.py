@@ -99,6 +99,7 @@ def shifts_of_steps(
         there = np.array(changes).reshape(own.size, weight.size)
         # one may be a period off: what the signal does not tell stays where it is
         covariance = np.linalg.inv(there @ there.T + np.eye(own.size))
+        # without that caution again, with its own error
         kept = np.minimum(np.diag(covariance), 1.0 - 1e-9)
         shifts = valve.values['phase'] + covariance @ (there @ residual) / (1.0 - kept)
         found.append((own, shifts, np.sqrt(kept / (1.0 - kept))))
