@@ -54,3 +54,19 @@ def test_each_step_is_put_in_its_period_behind_a_slow_chamber(share, effect):
         few = ~np.isin(large, early)
     assert few.any()
     assert np.mean(moved == few) > 0.95
+
+
+@pytest.mark.parametrize(('period', 'since', 'lag'), [(0.5, 0.15, 0.32), (0.2, 0.01, 0.06)])
+def test_a_lag_is_named_from_what_follows_steps_wherever_the_sample_is(period, since, lag):
+    rng = np.random.default_rng(2)
+    fine = 0.01
+    per_sample = round(period / fine)
+    rows = np.repeat(rng.uniform(10.0, 90.0, 40), rng.integers(20, 60, 40))
+    values = {**VALVE, 'effects': ['ip_lag'], 'ip_lag.time_constant': lag}
+    run = simulate(np.repeat(rows, per_sample), fine, values)
+    p1 = run.p1[round(since / fine) :: per_sample] + 0.27 * rng.standard_normal(rows.size)
+    found = diagnose([Recording(period * np.arange(rows.size), rows, p1)])
+    (named,) = found.effects
+    assert named.rung.effect == 'ip_lag'
+    assert named.values['ip_lag.time_constant'] == pytest.approx(lag, rel=0.05)
+    assert found.ladders[0].after.excess < 0.1

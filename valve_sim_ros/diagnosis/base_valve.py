@@ -13,7 +13,7 @@ from .fitting import by_cost, eased, Fitter, NARROW, Problem, SHORT, Valve
 from .seen import friction_seen, mixed_arrivals
 from .stages import Group
 from .starts import friction_grid, grid, START, STEMS
-from .unknowns import EARLY, LATE, PHASE
+from .unknowns import EARLY, LATE, PHASE, Unknown
 
 FEW_STARTS = 3
 """So many starts are followed."""
@@ -21,6 +21,9 @@ FOLLOWED, GENERATIONS = 4, 30
 """So many base valves are followed by an evolution where costs are rugged, and for how long."""
 NEARLY = 0.95
 """Phase beyond which a command acts nearly a whole period late or early."""
+LAG, CLEARLY = 'ip_lag', 50.0
+"""An answer that lags may have gone less than half the way where it is first seen: with it that
+sample must be told so much better."""
 
 
 def starting_valve(bench: Bench) -> Valve:
@@ -93,15 +96,23 @@ def find_base(
 
 def _settle_phase(fitter: Fitter, group: Group, valve: Valve) -> None:
     """Find out whether p1 answers at the sample that shows the command or at the next."""
-    best = []
-    for phase in (EARLY, LATE):
+    lag = next(each for each in group.candidates() if each.effect == LAG)
+    effects = tuple(dict.fromkeys((*valve.effects, LAG)))
+    lagging = replace(valve, effects=effects, candidates=(lag,))
+
+    def fitted(kind: Valve, added: Sequence[dict[str, float]], phase: Unknown) -> Valve:
         fitter.phase = phase
-        problem: Problem = (fitter.unknowns(group), group.signal, group.drive)
+        problem = (fitter.problem(group, kind)[0], group.signal, group.drive)
         values = {**valve.values, 'phase': min(phase.upper, 0.0)}
-        starts = [{**values, **there} for there in grid(problem[0])]
-        best.append(fitter.fit(fitter.scan(valve, starts, problem)[0], problem, SHORT))
-    fitter.phase = EARLY if best[0].cost <= best[1].cost else LATE
-    on_time = replace(best[0], values={**best[0].values, 'phase': 0.0})
+        points = grid(fitter.unknowns(group))
+        starts = [{**values, **own, **there} for own in added for there in points]
+        return fitter.fit(fitter.scan(kind, starts, problem)[0], problem, SHORT)
+
+    early, late = (fitted(valve, [{}], phase) for phase in (EARLY, LATE))
+    lags_early, lags_late = (fitted(lagging, lag.starts({}), phase) for phase in (EARLY, LATE))
+    answers_late = early.cost > late.cost and lags_early.cost > lags_late.cost - CLEARLY
+    fitter.phase = LATE if answers_late else EARLY
+    on_time = replace(early, values={**early.values, 'phase': 0.0})
     results = fitter.results(on_time, ())
     if mixed_arrivals(fitter.bench, results):
         fitter.bench.weigh_down(MIXED_JITTER, results)

@@ -202,7 +202,11 @@ class Bench:
     def _uncertainty(self, name: str, values: Array) -> Array:
         """Return the noise of each sample, more where the signal moves: sample times jitter."""
         steps = np.abs(np.diff(values, prepend=values[:1], append=values[-1:]))
-        slope = np.nan_to_num(np.fmax(steps[:-1], steps[1:]))
+        slope = np.fmax(steps[:-1], steps[1:])
+        if name == 'p1':
+            # a step is over within a sample, and what still follows it tells a lag
+            slope = np.where(np.isnan(steps[1:]), slope, steps[1:])
+        slope = np.nan_to_num(slope)
         noise = self.noise[name]
         slope = np.maximum(slope - 2.0 * noise, 0.0)
         return np.sqrt(noise**2 + (self.jitter * slope) ** 2)
