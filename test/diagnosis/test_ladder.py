@@ -252,3 +252,16 @@ def test_steps_of_x_are_named_where_no_fit_shows_them(outcome):
     assert [rung.effect for rung in found.rungs] == [COARSE]
     assert found.valve.values[f'{COARSE}.step'] == pytest.approx(step, rel=1e-3)
     assert rounded(fitter, found, only, again) == found
+
+
+@pytest.mark.parametrize('lag', [0.4, 0.0])
+def test_a_lag_that_a_slower_stem_hides_in_coloured_noise_is_named(lag):
+    rng = np.random.default_rng(4)
+    u = np.repeat(rng.uniform(10.0, 90.0, 30), rng.integers(60, 200, 30))
+    s = simulate(u, 0.1, {**VALVE, 'effects': ['sensor_lag'], 'sensor_lag.time_constant': lag})
+    noise = lfilter([1.0], [1.0, -0.5], rng.standard_normal((3, u.size)))
+    noise *= 0.2 / noise.std()
+    found = diagnose([Recording(s.t, u, s.p1 + noise[0], s.p2 + noise[1], s.x + noise[2])])
+    assert found.ladders[-1].before.excess < 0.02
+    named = {name: value for each in found.effects for name, value in each.values.items()}
+    assert named == ({'sensor_lag.time_constant': pytest.approx(lag, rel=0.1)} if lag else {})

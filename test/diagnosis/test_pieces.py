@@ -323,6 +323,19 @@ def test_single_steps_of_the_command_show_whether_arrivals_are_mixed():
         assert mixed_arrivals(bench, wrong) == mixed
 
 
+def test_a_record_that_begins_in_motion_starts_at_its_first_sample():
+    rng = np.random.default_rng(4)
+    u = np.repeat(rng.uniform(10.0, 90.0, 30), rng.integers(30, 100, 30))
+    run = simulate(u, parameters={'f_d1': 0.5, 'T_g1': 2.0, 'T_g2': 5.0, 'f_s': 4.0, 'f_d': 2.4})
+    assert run.p2[1] > 5.0
+    noisy = [each + 0.2 * rng.standard_normal(u.size) for each in (run.p1, run.p2)]
+    bench = Bench([Recording(run.t, u, *noisy)])
+    assert bench.stretches[0].first['p2'] == pytest.approx(0.0, abs=1.0)
+    noisy[1][0] = 30.0  # an outlier
+    bench = Bench([Recording(run.t, u, *noisy)])
+    assert bench.stretches[0].first['p2'] < 10.0
+
+
 @pytest.mark.parametrize('rms', [0.1, 0.6])  # moves of up to 13 or 2.2 times the noise
 def test_a_command_that_always_moves_shows_it_too_and_no_lag_passes_for_chance(rms):
     rng = np.random.default_rng(8)

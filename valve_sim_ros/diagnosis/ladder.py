@@ -143,25 +143,32 @@ def climb(
             return False
         return odds.suspicious(left, group, fitter.bench.mixed)
 
+    def sought(left: Leftover) -> Sequence[Candidate]:
+        if worth(left):
+            return candidates
+        hidden = group.stages == ('p2-x',) and not (rungs or named or carried > odds.SPOTLESS)
+        return [each for each in candidates if hidden and CATALOGUE[each.effect].imitated]
+
     now, before = base, base_left = seen(valve)
     with suppress(*stops):
         progress(0.0)
         if refit:
             now, before = base, base_left = seen(find_base(fitter, group, valve, fitter.drive))
         for step in range(MOST_EFFECTS):
-            if not candidates or not worth(before):
+            some = sought(before)
+            if not some:
                 break
             told = _within(progress, step)
-            runners = race(fitter, group, now, candidates, told)
+            runners = race(fitter, group, now, some, told)
             # in the second look the stem is put to rest already, no valley of the base is missed
-            if group.has_stem and not rungs and not again:
+            if group.has_stem and some is candidates and not rungs and not again:
                 runners = deepened(fitter, group, now, runners, told)
             now = rebased(fitter, group, now, runners[:5])
             before = leftover(fitter.residuals(now, group.signal))
             if not rungs:
                 base, base_left = now, before
-            rung = judged(fitter, group, now, before, runners) if worth(before) else None
-            if rung is None:
+            rung = judged(fitter, group, now, before, runners)
+            if rung is None or rung.effect not in {each.effect for each in sought(before)}:
                 break
             rung = _on_time(fitter, group, rung)
             gained, first = rung.gains[rung.effect], not rungs

@@ -20,6 +20,8 @@ from there, which leaves a right valve alone; the same, while slips must come at
 and at every moment."""
 PUT_TO_REST = {RESTS, CAUGHT, ON_TIME}
 STEM = OUTPUTS.index('x')
+MOVES = 4.0
+"""What begins by more than this within two samples moves [noise]."""
 Rows = npt.NDArray[np.intp]
 
 
@@ -174,4 +176,9 @@ def _beginning(values: Array, noise: float) -> float:
         if drift > 2.5 * noise * np.sqrt(2.0 / size):
             break
         size *= 2
-    return float(values[:size].mean()) if size > 4 else float(np.median(values[:3]))
+    if size > 4 or values.size < 3:
+        return float(values[:size].mean())
+    first, second, third = values[:3]
+    if abs(third - first) > MOVES * noise:  # the first, unless it is an outlier
+        third = 2.0 * second - third
+    return float(np.median([first, second, third]))

@@ -161,6 +161,9 @@ class Effect:
         A run with it takes many times as long: a search tries others first.
     rugged : bool
         A fit of it has many valleys: a search follows each of its starts further.
+    imitated : bool
+        A base valve with another friction or damping nearly does the same: a search looks for it
+        even where that leaves nothing but noise.
     twins : mapping of str to str
         Effects that look alike, each with what tells them apart.
     variants : tuple of tuple of str
@@ -186,6 +189,7 @@ class Effect:
     order: int = 0
     laborious: bool = False
     rugged: bool = False
+    imitated: bool = False
     twins: Mapping[str, str] = field(default_factory=dict)
     variants: tuple[tuple[str, ...], ...] = ()
     balance: Callable[..., float] | None = None

@@ -41,6 +41,7 @@ EFFECT = Effect(
     slots={'sensor_slot': sensor},
     memory=1,
     order=0,
+    imitated=True,
     explanation='A loose joint between the stem and the position sensor.',
     symptom='Measured x holds after each reversal although the force moved on.',
     confirm='Watch stem and sensor by hand while the valve reverses.',

@@ -43,6 +43,7 @@ EFFECT = Effect(
     memory=2,
     longest_step=0.1,
     order=10,
+    imitated=True,
     explanation='The position transmitter filters its signal.',
     symptom='Measured slips are rounded.',
     confirm='Move the sensor by hand, or read its damping setting.',
