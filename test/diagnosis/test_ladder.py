@@ -257,7 +257,7 @@ def test_steps_of_x_are_named_where_no_fit_shows_them(outcome):
 @pytest.mark.parametrize('lag', [0.4, 0.0])
 def test_a_lag_that_a_slower_stem_hides_in_coloured_noise_is_named(lag):
     rng = np.random.default_rng(4)
-    u = np.repeat(rng.uniform(10.0, 90.0, 30), rng.integers(60, 200, 30))
+    u = np.repeat(rng.uniform(10.0, 90.0, 60), rng.integers(60, 200, 60))
     s = simulate(u, 0.1, {**VALVE, 'effects': ['sensor_lag'], 'sensor_lag.time_constant': lag})
     noise = lfilter([1.0], [1.0, -0.5], rng.standard_normal((3, u.size)))
     noise *= 0.2 / noise.std()
@@ -265,3 +265,17 @@ def test_a_lag_that_a_slower_stem_hides_in_coloured_noise_is_named(lag):
     assert found.ladders[-1].before.excess < 0.02
     named = {name: value for each in found.effects for name, value in each.values.items()}
     assert named == ({'sensor_lag.time_constant': pytest.approx(lag, rel=0.1)} if lag else {})
+
+
+@pytest.mark.parametrize('noise', [0.0, 0.05])
+def test_a_clean_record_in_steps_of_a_tenth_is_adequate(noise):
+    rng = np.random.default_rng(7)
+    u = np.repeat(rng.uniform(10.0, 90.0, 60), 50)
+    s = simulate(u, parameters=VALVE)
+    coarse = [
+        0.1 * np.rint((each + noise * rng.standard_normal(u.size)) / 0.1)
+        for each in (s.p1, s.p2, s.x)
+    ]
+    found = diagnose([Recording(s.t, u, *coarse)])
+    assert found.verdict == 'adequate'
+    assert all(ladder.before.excess < 0.2 for ladder in found.ladders)

@@ -37,11 +37,18 @@ def starting_valve(bench: Bench) -> Valve:
 
 
 def find_base(
-    fitter: Fitter, group: Group, valve: Valve, drive: Sequence[str], *, roughly: bool = False
+    fitter: Fitter,
+    group: Group,
+    valve: Valve,
+    drive: Sequence[str],
+    *,
+    roughly: bool = False,
+    closely: bool = False,
 ) -> Valve:
     """Find the base valve's values in one group from a grid, `drive` as measured.
 
-    `roughly` leaves out the long searches, where the values are sought anew later.
+    `roughly` leaves out the long searches, where the values are sought anew later; `closely` does
+    them even where nothing but noise is left.
     """
     if group.stages == ('u-p1',) and drive == group.drive:
         _settle_phase(fitter, group, valve)
@@ -82,7 +89,7 @@ def find_base(
         return put_in_its_period(fitter, group, best, problem)
     best = fitter.fit(found[0], problem)
     left = leftover(fitter.residuals(best, group.signal, drive))
-    if not odds.suspicious(left, group, fitter.bench.mixed):
+    if not (closely or odds.suspicious(left, group, fitter.bench.mixed)):
         return best
     # caught where it is far from its rest, a stem that slips too late is only a little wrong
     way = eased(problem)[0]

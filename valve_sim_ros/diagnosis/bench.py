@@ -20,6 +20,7 @@ from .errors import DiagnosisError
 from .readings import (
     coarse_step,
     filled,
+    resolution_of,
     REST,
     slope_of,
     smooth,
@@ -74,7 +75,8 @@ class Bench:
             if part.stop - part.start > 20
         ]
         self.noise = {
-            name: noise_of([s.measured[name] for s in self.stretches]) for name in self.signals
+            name: self._noise_of([s.measured[name] for s in self.stretches])
+            for name in self.signals
         }
         for stretch in self.stretches:
             for name, values in stretch.measured.items():
@@ -198,6 +200,12 @@ class Bench:
         row = BESIDE if name == 'x' else OUTPUTS.index(name)
         pairs = zip(self.stretches, results, strict=True)
         return np.concatenate([(s.counts[name] - r[row]) / s.noise[name] for s, r in pairs])
+
+    def _noise_of(self, parts: Sequence[Array]) -> float:
+        """Return the noise of a signal, steps of its resolution included."""
+        step = resolution_of(np.concatenate(parts))
+        # as in `forgive_steps`: hardly any noise may be seen from sample to sample
+        return max(noise_of(parts), step / math.sqrt(12.0 * LOWEST))
 
     def _uncertainty(self, name: str, values: Array) -> Array:
         """Return the noise of each sample, more where the signal moves: sample times jitter."""

@@ -13,15 +13,12 @@ from .adequacy import Leftover, leftover
 from .arrivals import put_in_its_period
 from .base_valve import find_base
 from .fitting import by_cost, Fitter, Valve
-from .race import FAR_AHEAD, in_reach, race, rebased
+from .race import deepened, race, rebased
 from .stages import Candidate, Group
 from .stretch import PUT_TO_REST
 
 MOST_EFFECTS = 2
 """Most effects named in one group of stages."""
-
-DEEPENED = 3
-"""So many effects are searched more deeply where none explains what is left."""
 
 RECONSIDERED = 5
 """So many rivals of the first effect are tried again beside the second."""
@@ -168,6 +165,11 @@ def climb(
             if not rungs:
                 base, base_left = now, before
             rung = judged(fitter, group, now, before, runners)
+            if rung and some is not candidates:  # another valley of the base valve may do as well
+                close = find_base(fitter, group, now, fitter.drive, closely=True)
+                now, before = seen(min(now, close, key=by_cost))
+                base, base_left = now, before
+                rung = judged(fitter, group, now, before, runners)
             if rung is None or rung.effect not in {each.effect for each in sought(before)}:
                 break
             rung = _on_time(fitter, group, rung)
@@ -203,37 +205,6 @@ def _on_time(fitter: Fitter, group: Group, rung: Rung) -> Rung:
     valve = put_in_its_period(fitter, group, rung.valve, fitter.problem(group, rung.valve))
     after = leftover(fitter.residuals(valve, group.signal))
     return replace(rung, valve=valve, after=after, closed=rung.before.closed_by(after))
-
-
-def deepened(
-    fitter: Fitter,
-    group: Group,
-    valve: Valve,
-    runners: list[Valve],
-    progress: Callable[[float], object],
-) -> list[Valve]:
-    """Search for the base valve anew beside the best effects, if none explains the signal.
-
-    Not beside those whose runs take long: it would take minutes.
-    """
-
-    def explains(runner: Valve) -> bool:
-        return leftover(fitter.residuals(runner, group.signal)).excess <= odds.CLEAN
-
-    best = runners[0]
-    if explains(best):
-        return runners
-    found = []
-    for each in in_reach(valve, odds.best_per_effect(runners)[:DEEPENED]):
-        # far behind one that explains the signal, others need no deeper search
-        hopeless = explains(best) and each.cost > best.cost / FAR_AHEAD
-        if hopeless or CATALOGUE[each.candidates[-1].effect].laborious:
-            continue
-        progress(1.0)
-        there = find_base(fitter, group, each, fitter.drive)
-        found.append(fitter.refined(there, fitter.problem(group, there)))
-        best = min(best, found[-1], key=by_cost)
-    return sorted([*found, *runners], key=by_cost)
 
 
 def reconsidered(fitter: Fitter, group: Group, base: Valve, rungs: Sequence[Rung]) -> list[Rung]:
@@ -308,9 +279,11 @@ def judged(
     after = leftover(fitter.residuals(best, group.signal))
     change = before.mean_square - after.mean_square
     least = odds.LEAST_SHIFT if candidate.effect in odds.LASTING else odds.LEAST_CHANGE
+    little = before.excess < odds.LEAST_EXCESS[group.signal]
+    enough = odds.MORE_ENOUGH if little else odds.ENOUGH
     # where a few far errors were the only reason to look, they must be gone
-    only_far = before.excess < odds.LEAST_EXCESS[group.signal] and after.far >= odds.LEAST_FAR
-    if gains[candidate.effect] < odds.ENOUGH or change < least or only_far:
+    only_far = little and after.far >= odds.LEAST_FAR
+    if gains[candidate.effect] < enough or change < least or only_far:
         return None
     closed = before.closed_by(after)
     return Rung(

@@ -14,7 +14,8 @@ from .unknowns import declared
 ENOUGH = 25.0
 """Least gain in half log-likelihoods of independent samples for any name."""
 MORE_ENOUGH, MORE_EXCESS, MORE_CLOSED = 60.0, 0.15, 0.6
-"""What a further effect needs: gain, excess before it, and the part of it that it closes."""
+"""What a further effect needs: gain (any effect, where the base valve leaves no least excess),
+excess before it, and the part of it that it closes."""
 MORE_SHARE, FAR_OFF = 0.02, 2.0
 """Least part of the whole gap that it closes, unless it leaves nothing but noise; the excess that
 is far more than noise: it may close less of that, if both together explain the gap."""

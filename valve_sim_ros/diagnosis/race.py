@@ -16,6 +16,7 @@ from ..model.effects import CATALOGUE
 from ..model.pipeline import Array
 from . import odds
 from .adequacy import leftover
+from .base_valve import find_base
 from .fitting import by_cost, eased, FAINT, Fitter, LONG, Problem, SHORT, Valve
 from .seen import calibration_seen, friction_seen
 from .stages import Candidate, Group
@@ -40,6 +41,9 @@ more than a part of its gain are not followed."""
 NEARLY_ALL = 0.02
 """What the best may leave of the excess, and no more than noise, where laborious effects that do
 not look like it are not tried."""
+
+DEEPENED = 3
+"""So many effects are searched more deeply where none explains what is left."""
 
 Frictions = Sequence[dict[str, float]]
 
@@ -151,6 +155,37 @@ def in_reach(valve: Valve, runners: Sequence[Valve]) -> list[Valve]:
     """Return the runners that are not far behind the first in what they gain over the valve."""
     best = runners[0].cost
     return [each for each in runners if each.cost <= best + BEHIND * (valve.cost - best)]
+
+
+def deepened(
+    fitter: Fitter,
+    group: Group,
+    valve: Valve,
+    runners: list[Valve],
+    progress: Callable[[float], object],
+) -> list[Valve]:
+    """Search for the base valve anew beside the best effects, if none explains the signal.
+
+    Not beside those whose runs take long: it would take minutes.
+    """
+
+    def explains(runner: Valve) -> bool:
+        return leftover(fitter.residuals(runner, group.signal)).excess <= odds.CLEAN
+
+    best = runners[0]
+    if explains(best):
+        return runners
+    found = []
+    for each in in_reach(valve, odds.best_per_effect(runners)[:DEEPENED]):
+        # far behind one that explains the signal, others need no deeper search
+        hopeless = explains(best) and each.cost > best.cost / FAR_AHEAD
+        if hopeless or CATALOGUE[each.candidates[-1].effect].laborious:
+            continue
+        progress(1.0)
+        there = find_base(fitter, group, each, fitter.drive)
+        found.append(fitter.refined(there, fitter.problem(group, there)))
+        best = min(best, found[-1], key=by_cost)
+    return sorted([*found, *runners], key=by_cost)
 
 
 def rebased(fitter: Fitter, group: Group, valve: Valve, runners: Sequence[Valve]) -> Valve:

@@ -18,6 +18,8 @@ that it keeps as well [share], the least that noise may leave of that, and how m
 OFF, ALL, LEAST_STEP, LEAST_VALUES = 0.05, 0.99, 0.3, 4
 """How near to multiples of a coarse sensor's step [steps] nearly all x lie [share]; finer steps
 [%] are a usual resolution, and fewer values may be chance."""
+TINY = 1e-6
+"""A finer resolution is that of the numbers [%]."""
 BIN, LONG = 0.01, 32
 """Bins in which x is counted [%], and how much longer their spectrum is than the span."""
 REST, FEW = 5, 8
@@ -131,6 +133,17 @@ def steps_kept(x: Array, noise: float) -> tuple[float, ...]:
     # halves of a step are kept as well as the step
     alike = peaks[kept[peaks] >= AS_WELL * kept[peaks].max(initial=0.0)]
     return tuple((1.0 / frequency[alike[:MOST_STEPS]]).tolist())
+
+
+def resolution_of(values: Array) -> float:
+    """Return the step on whose multiples all values lie [% of span], 0 if none or a coarse one."""
+    known = np.unique(values[np.isfinite(values)])
+    gaps = np.diff(known)
+    step = float(gaps.min(initial=np.inf))
+    if not TINY < step < LEAST_STEP:
+        return 0.0
+    parts = gaps / step
+    return step if np.abs(parts - np.rint(parts)).max() < OFF else 0.0
 
 
 def coarse_step(x: Array, rough_steps: Iterable[float]) -> float:
