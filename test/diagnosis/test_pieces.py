@@ -18,6 +18,8 @@ from valve_sim_ros.diagnosis.decision import TestSignal
 from valve_sim_ros.diagnosis.descent import cost_of, descend, walk
 from valve_sim_ros.diagnosis.evolution import evolve
 from valve_sim_ros.diagnosis.fitting import Fitter, Valve
+from valve_sim_ros.diagnosis.intervals import intervals
+from valve_sim_ros.diagnosis.loosening import loosened
 from valve_sim_ros.diagnosis.proof import closed
 from valve_sim_ros.diagnosis.readings import straightened
 from valve_sim_ros.diagnosis.seen import calibration_seen, friction_seen, mixed_arrivals
@@ -141,6 +143,27 @@ def test_a_stem_that_is_nearly_free_is_forgiven_nothing(drive):
     results = bench.run(complete(free), (), drive)
     assert np.mean(results[0][3] != results[0][2]) < 0.02
     assert np.mean(np.abs(bench.residual(results, 'x')) > 5.0) > 0.3
+
+
+def test_a_slip_that_hangs_on_what_noise_leaves_open_of_p2_comes():
+    levels = ((20, 20.0), (300, 70.0), (300, 30.0), (300, 62.0), (300, 25.0))
+    barely = ((300, 66.0), (300, 53.78), (300, 66.0), (300, 30.0))
+    slow, _, record = slow_valve((*levels, *barely), 0.2, f_s=7.0, T_g1=4.0, T_g2=4.0)
+    rng = np.random.default_rng(1)
+    noisy = {n: record.output(n) + 0.2 * rng.standard_normal(len(record)) for n in ('p1', 'p2')}
+    fitter = Fitter(Bench([replace(record, **noisy)]))
+    first, second, stem = groups(('p1', 'p2', 'x'))
+    missed = Valve({**slow, 'f_d1': 0.52})  # the true dead band is 0.5
+    assert leftover(fitter.residuals(missed, 'x')).excess > 5.0
+    found = loosened(fitter, stem, missed)
+    assert leftover(fitter.residuals(found, 'x')).excess < odds.SPOTLESS
+    assert found.cost < 0.1 * fitter.score(missed, 'x')
+    for group in (first, second):
+        spans = intervals(fitter, group, missed, 1.0)
+        for name in ('f_d1', 'T_g1', 'T_g2'):
+            low, high = spans.get(name, (-np.inf, np.inf))
+            middle, width = 0.5 * (low + high), high - low
+            assert name not in spans or abs(found.values[name] - middle) < width
 
 
 def test_a_coarse_sensor_shows_its_step():

@@ -94,9 +94,7 @@ def climb_all(
         if group.signal == 'p1' and dead_time.EFFECT in valve.effects:
             fitter.phase = PHASE  # p1 shows a dead time to a sample only, what follows the rest
         if not added:
-            names = [unknown.name for unknown in fitter.unknowns(group)]
-            found = {name: ladder.base.values[name] for name in names}
-            base = replace(base, values={**base.values, **found})
+            base = ladder.base
         inexact = group.signal == 'p1' and ladder.after.excess > odds.ADEQUATE['p1']
         if ladder.outcome == 'unknown_effect' or inexact:
             # what is wrong here must not be blamed on the stages that follow; a stem that is

@@ -4,6 +4,7 @@
 
 import numpy as np
 
+from ..model.pipeline import Array
 from .fitting import Fitter, Valve
 from .stages import Group
 from .unknowns import to_point, to_values
@@ -33,6 +34,21 @@ def intervals(
     dict of str to (float, float)
         By full name; the declared range where the data say nothing.
     """
+    unknowns = fitter.problem(group, valve)[0]
+    point = to_point(unknowns, valve.values)
+    variances = np.diag(covariance(fitter, group, valve, inflation))
+    spread = np.where(variances > 0.0, 1.96 * np.sqrt(np.maximum(variances, 0.0)), np.inf)
+    return {
+        unknown.name: (unknown.outward(float(at - each)), unknown.outward(float(at + each)))
+        for unknown, at, each in zip(unknowns, point, spread, strict=True)
+    }
+
+
+def covariance(fitter: Fitter, group: Group, valve: Valve, inflation: float) -> Array:
+    """Return the covariance of what a refit would vary, shape (n, n) [steps of the unknowns].
+
+    Arguments as for `intervals`; 0 where the data say nothing.
+    """
     unknowns, signal, drive = fitter.problem(group, valve)
     point = to_point(unknowns, valve.values)
     moved = []
@@ -48,10 +64,9 @@ def intervals(
     jacobian = np.clip(np.stack(moved, axis=1), -50.0, 50.0)
     residual = fitter.residuals(valve, signal, drive)
     variance = float(np.mean(np.clip(residual, -4.0, 4.0) ** 2)) * inflation
-    covariance = variance * np.linalg.pinv(jacobian.T @ jacobian, rcond=1e-10)
-    spread = 1.96 * np.sqrt(np.maximum(np.diag(covariance), 0.0))
-    spread[~jacobian.any(axis=0)] = np.inf
-    return {
-        unknown.name: (unknown.outward(float(at - each)), unknown.outward(float(at + each)))
-        for unknown, at, each in zip(unknowns, point, spread, strict=True)
-    }
+    shown = jacobian.any(axis=0)
+    found = np.zeros((point.size, point.size))
+    inside = np.ix_(shown, shown)
+    normal = jacobian[:, shown].T @ jacobian[:, shown]
+    found[inside] = variance * np.linalg.pinv(normal, rcond=1e-10)
+    return found

@@ -13,6 +13,7 @@ from .adequacy import Leftover, leftover
 from .arrivals import put_in_its_period
 from .base_valve import find_base
 from .fitting import by_cost, Fitter, Valve
+from .loosening import loosened
 from .race import deepened, race, rebased
 from .stages import Candidate, Group
 from .stretch import PUT_TO_REST
@@ -150,7 +151,13 @@ def climb(
     with suppress(*stops):
         progress(0.0)
         if refit:
-            now, before = base, base_left = seen(find_base(fitter, group, valve, fitter.drive))
+            now, before = seen(find_base(fitter, group, valve, fitter.drive))
+            modelled = group.has_stem and group.drive and not fitter.drive
+            if modelled and before.excess > odds.SPOTLESS:
+                loose, left = seen(loosened(fitter, group, now))
+                if not worth(left):
+                    now, before = loose, left
+            base, base_left = now, before
         for step in range(MOST_EFFECTS):
             some = sought(before)
             if not some:
