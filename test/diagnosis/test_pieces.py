@@ -244,6 +244,23 @@ def test_a_stem_is_where_it_was_seen_until_it_travels():
     assert result[2, 15] == pytest.approx(0.0, abs=0.3)
 
 
+def test_a_play_nobody_saw_before_the_record_does_not_reach_p2():
+    u = np.concatenate([np.full(200, 90.0), np.full(100, 60.0), commands()[20:]])
+    slow = complete({**VALUES, 'T_g1': 20.0, 'T_g2': 20.0})
+    values = {n: v for n, v in slow.items() if n not in ('phase', 'damping')}
+    neutral = {f'hysteresis.{p.name}': p.neutral for p in CATALOGUE['hysteresis'].parameters}
+    play = {**neutral, 'hysteresis.command_width': 5.0, 'hysteresis.reach': 1.0}
+    parameters = {n: v for n, v in values.items() if '/' not in n}
+    run = simulate(u, parameters={**parameters, 'effects': ['hysteresis'], **play})
+    noise = 0.2 * np.random.default_rng(3).standard_normal((2, u.size))
+    later = slice(250, None)
+    p1, p2 = (run.p1 + noise[0])[later], (run.p2 + noise[1])[later]
+    bench = Bench([Recording(run.t[: p1.size], u[later], p1, p2)])
+    results = bench.run({**slow, **play}, ('hysteresis',))
+    assert np.abs(results[0][0] - run.p1[later])[:50].max() > 3.0
+    assert np.nanmax(np.abs(bench.residual(results, 'p2'))) < 5.0
+
+
 @pytest.mark.parametrize('noise', [0.1, 0.3])
 def test_a_stem_that_creeps_at_first_is_not_held_where_it_seems_to_rest(noise):
     levels = ((50, 70.0), (150, 20.0), (700, 90.0))

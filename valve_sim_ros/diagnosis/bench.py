@@ -45,6 +45,8 @@ SLACK, SLACK_SHARE, EASE = 0.03, 0.01, 10.0
 """By so much p2 may be off where the stem begins to slip [% of span], but by no more than this
 part of the friction: a stem that is nearly free always begins to slip; and how many times as much
 where the stem is put to rest: the moment of each slip says little there."""
+STEP = 4.0
+"""Where p1 moves by more within a sample it steps [noise]."""
 CREEPS = 3.0
 """A stem that drifts by more before it has surely moved moves when the record begins [noise]."""
 APART = 6.0
@@ -86,6 +88,12 @@ class Bench:
             travelled = self._travelled(stretch.measured[self.signals[-1]], TRAVEL) + 10
             settled = samples >= min(travelled, int(MOST_UNSETTLED * samples.size))
             stretch.recount({n: np.where(settled, v, np.nan) for n, v in stretch.measured.items()})
+            if 'p1' in self.signals:
+                whole, noise = filled(stretch.measured['p1']), self.noise['p1']
+                # beside a step nobody knows on which side of the sample it was
+                moves = np.abs(np.diff(whole, prepend=whole[:1], append=whole[-1:])) > STEP * noise
+                known = np.where(moves[:-1] | moves[1:], np.nan, smooth(whole, noise))
+                stretch.begins['p1'] = np.where(settled, np.nan, known)
             if 'x' in self.signals:
                 whole, noise = filled(stretch.measured['x']), self.noise['x']
                 rests, smoothed = still(whole, noise), smooth(whole, noise)
@@ -99,7 +107,8 @@ class Bench:
                     stretch.speed = slope / float(np.median(np.diff(stretch.time)))
                 else:
                     # a first slip that was seen on its way must not be put to rest there
-                    stretch.begins = np.where(samples < departed - REST, stretch.rests, np.nan)
+                    seen = samples < departed - REST
+                    stretch.begins['x'] = np.where(seen, stretch.rests, np.nan)
         self.size = sum(stretch.u.size for stretch in self.stretches)
         steps = [np.diff(stretch.time) for stretch in self.stretches]
         self.period = float(np.median(np.concatenate(steps))) if steps else 0.0

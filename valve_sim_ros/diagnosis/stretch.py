@@ -46,10 +46,11 @@ class Stretch:
     """A run of samples without a gap, shape (n,) each; outputs are NaN where lost.
 
     `counts` are the measured outputs where they count, `noise` their uncertainty, `rests` x
-    where it rests, `begins` the same until the stem first moves: there it is always put, since
-    nobody knows what held it before. `speed` is that of a stem that moves at the beginning [%/s],
-    `held` is x smoothed between its slips. `shown` are the commands of the recording, where `u`
-    are those that the valve is taken to have received.
+    where it rests. `begins` is x until the stem first moves, and p1 until it counts: nobody knows
+    what was before the record, plays and friction remember it, and so the valve receives those as
+    measured. `speed` is that of a stem that moves at the beginning [%/s], `held` is x smoothed
+    between its slips. `shown` are the commands of the recording, where `u` are those that the
+    valve is taken to have received.
     """
 
     time: Array
@@ -58,7 +59,7 @@ class Stretch:
     counts: dict[str, Array] = field(default_factory=dict)
     noise: dict[str, Array] = field(default_factory=dict)
     rests: Array = field(default_factory=lambda: np.empty(0))
-    begins: Array = field(default_factory=lambda: np.empty(0))
+    begins: dict[str, Array] = field(default_factory=dict)
     speed: float = 0.0
     held: Array = field(default_factory=lambda: np.empty(0))
     _grids: dict[Any, Grid] = field(default_factory=dict)
@@ -130,8 +131,8 @@ class Stretch:
         rows[order] = np.arange(time.size)
         rows = rows[:n]
         forced, nothing = np.full((3, time.size), np.nan), np.full(time.size, np.nan)
-        if self.begins.size:
-            forced[STEM, rows] = self.begins
+        for name, values in self.begins.items():
+            forced[OUTPUTS.index(name), rows] = values
         for name in drive:
             if name == HELD:
                 # what a loop sees at the end of a step
