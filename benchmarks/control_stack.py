@@ -25,6 +25,8 @@ from valve_sim_ros.nodes.messages import LOSSLESS
 from valve_sim_ros.nodes.spinning import new_executor
 from valve_sim_ros.nodes.valve_plant import ValvePlant
 
+MOST_BARE = 20.0
+"""Longest look at what the machine itself holds back [s]."""
 WARM_UP = 5.0
 """Seconds for machine code and discovery before anything is counted."""
 
@@ -91,7 +93,8 @@ def paced(count, rate, seconds, results):
     for plant in plants:
         for times in (plant.late, plant.taken, plant.begun):
             times.clear()
-    missed, cpu, begin = [p.missed_periods for p in plants], cpu_seconds(), time.monotonic()
+    missed, tardy = zip(*((p.missed_periods, p.pacing.late_samples) for p in plants), strict=True)
+    cpu, begin = cpu_seconds(), time.monotonic()
     steal = stolen()
     spin_for(executor, seconds)
     wall = time.monotonic() - begin
@@ -100,6 +103,7 @@ def paced(count, rate, seconds, results):
         {
             'rate': late.size / wall / count,
             'missed': sum(p.missed_periods - m for p, m in zip(plants, missed, strict=True)),
+            'tardy': sum(p.pacing.late_samples - k for p, k in zip(plants, tardy, strict=True)),
             'periods': wall * rate * count,
             'cpu': (cpu_seconds() - cpu) / wall / count,
             'stolen': (stolen() - steal) / wall / os.cpu_count(),
@@ -137,6 +141,17 @@ class Driver(Node):
         """Send the next command."""
         self.message.data = 30.0 + 0.001 * (self.count % 40_000)
         self.u.publish(self.message)
+
+
+def bare(rate, seconds, results):
+    """Count the periods that a loop loses which does nothing but look at the clock."""
+    begin = before = time.monotonic()
+    lost = 0
+    while before < begin + seconds:
+        now = time.monotonic()
+        lost += max(0, int((now - begin) * rate) - int((before - begin) * rate) - 1)
+        before = now
+    results.put(100.0 * lost / (rate * seconds))
 
 
 def lockstep(own_process, steps, results):
@@ -194,10 +209,11 @@ def measure(function, *arguments):
 
 
 def say_paced(count, rate, found):
-    share = 100.0 * found['missed'] / found['periods']
+    missed, tardy = (100.0 * found[name] / found['periods'] for name in ('missed', 'tardy'))
     print(
         f'{count:4d} valve(s) at {rate:g} Hz: {found["rate"]:.1f} samples/s each, '
-        f'{found["missed"]} of {found["periods"]:.0f} periods missed ({share:.3f} %), '
+        f'{found["missed"]} of {found["periods"]:.0f} periods missed ({missed:.3f} %), '
+        f'{found["tardy"]} samples after their period ({tardy:.3f} %), '
         f'{100.0 * found["cpu"]:.2f} % of a core per valve'
     )
     print(
@@ -231,6 +247,8 @@ def main(seconds, steps, cases):
     for case in cases:
         count, rate = map(float, case.split('@'))
         say_paced(int(count), rate, measure(paced, int(count), rate, seconds))
+        held = measure(bare, rate, min(seconds, MOST_BARE))
+        print(f'      a loop that only looks at the clock slept through {held:.3f} % of the periods')
     ways = ((False, 'one process'), (True, 'two processes'))
     for own_process, words in ways if steps else ():
         found = measure(lockstep, own_process, steps)

@@ -188,16 +188,25 @@ def test_pause_step_reset(bench):
     bench.until(lambda: plant.samples > 10)
 
 
-def test_late_samples_are_not_counted_as_missed(bench, monkeypatch):
+@pytest.mark.parametrize(
+    ('period', 'ticks', 'late', 'missed'),
+    [
+        # the period in which each tick runs; at 5 Hz two are made up for: 10, 11 never come
+        (0.2, [5, 6, 8, 8, 9, 13, 14], 2, 2),
+        # at 2 kHz 400 are, 40 of them before anybody else gets a turn: 9 to 108 never come
+        (0.0005, [5, 6, 8, *[508] * 10, 509], 1 + 399, 100),
+    ],
+)
+def test_short_lateness_is_caught_up_and_long_one_counted(
+    bench, monkeypatch, period, ticks, late, missed
+):
     taken = []
-    wall = Wall(bench.add(Node('ticks')), 3600.0, lambda: taken.append(1))
+    wall = Wall(bench.add(Node('ticks')), period, lambda: taken.append(1))
+    monkeypatch.setattr(wall._node, 'create_timer', lambda *given, **named: None)
     wall.start(lambda back: None)
-    # the period in which each tick runs: 7 comes late, in 8; 10 to 12 never come
-    ticks = [5, 6, 8, 8, 9, 13, 14]
     periods = iter(ticks)
     monkeypatch.setattr(wall, '_index', lambda: next(periods))
     for _ in ticks:
         wall._tick()
-    assert len(taken) == len(ticks)
-    assert wall.missed_periods == 3
-    assert len(taken) + wall.missed_periods == ticks[-1] - ticks[0] + 1
+    assert len(taken) + missed == ticks[-1] - ticks[0] + 1
+    assert (wall.late_samples, wall.missed_periods) == (late, missed)

@@ -36,8 +36,11 @@ SPEED_FACTOR = Parameter(
 SECOND = 1_000_000_000
 LARGEST_GAP = 1 * SECOND
 """Forward jumps of /clock beyond this, and beyond five periods, are not integrated [ns]."""
-CATCH_UP = 0.2
-"""Lateness that own_clock still catches up [wall s]; beyond it periods are given up."""
+CATCH_UP, AT_ONCE = 0.2, 0.02
+"""Lateness that is still caught up, two periods at least; beyond it periods are given up. So much
+of it is made up for before anybody else gets a turn [wall s]."""
+SHORTEST_TIMER = 1e-3
+"""Shortest period of the timer of a clock that runs fast [wall s]."""
 CLOCK_START = 1.0
 """First time on the /clock of own_clock [s]; 0 would mean 'no time yet'."""
 
@@ -51,14 +54,16 @@ class Pacing:
         Whether time stands still for the valve; `resume` it to go on without integrating the
         pause.
     missed_periods : int
-        Periods without a sample because the machine was late.
+        Periods without a sample because the machine was too late.
+    late_samples : int
+        Samples taken when their period was over.
     """
 
     def __init__(self, node: Node, period: float, take: Callable[[], None]) -> None:
         """Keep the node, the sample time [s] and what takes one sample."""
         self._node, self._period, self._take = node, period, take
         self.paused = False
-        self.missed_periods = 0
+        self.missed_periods = self.late_samples = 0
 
     @property
     def now(self) -> float:
@@ -110,40 +115,45 @@ class Lockstep(Pacing):
 
 
 class Wall(Pacing):
-    """A steady timer; a period that the machine slept through has no sample and is counted."""
+    """A steady timer. Short lateness is caught up, so that the valve's time is the wall's."""
+
+    speed_factor = 1.0
 
     def start(self, jumped: Callable[[bool], None]) -> None:
         """Make the timer."""
-        clock = Clock(clock_type=ClockType.STEADY_TIME)
-        self._origin = time.monotonic_ns()
+        self._wall_period = self._period / self.speed_factor
+        # the samples of a faster clock come in bunches: more timers than that only cost
+        timer = max(self._wall_period, min(self._period, SHORTEST_TIMER))
+        self._most_late = max(2, round(CATCH_UP / self._wall_period))
+        self._most_at_once = max(2, round(AT_ONCE / self._wall_period))
         self._last: int | None = None
-        self._owed = 0
-        self._node.create_timer(self._period, self._tick, clock=clock)
+        self._origin = time.monotonic_ns()  # before the timer's, so that no tick comes early
+        self._node.create_timer(timer, self._tick, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
     def _tick(self) -> None:
-        """Take the sample of this period."""
+        """Take the samples that are due, a bunch at a time: commands must come in between."""
         if self.paused:
             return
-        # the timer keeps to its grid, which began at the origin
         index = self._index()
         if self._last is None:  # time before the first tick was the making of other nodes
-            self._last = index
-        elif index > self._last:
-            self.missed_periods += self._owed
-            self._owed, self._last = index - self._last - 1, index
-        else:  # two ticks in one period: the sample before was late, not lost
-            self._owed = max(self._owed - 1, 0)
-        self._take()
+            self._last = index - 1
+        lost = max(0, index - self._last - self._most_late)
+        self.missed_periods += lost
+        self._last += lost
+        for _ in range(min(index - self._last, self._most_at_once)):
+            self._last += 1
+            self.late_samples += self._last < index
+            self.step()
 
     def _skip_pause(self) -> None:
-        self._last, self._owed = self._index(), 0
+        self._last = self._index()
 
     def _index(self) -> int:
         """Return the number of the period that is running."""
-        return int((time.monotonic_ns() - self._origin) * 1e-9 / self._period)
+        return int((time.monotonic_ns() - self._origin) / SECOND / self._wall_period)
 
 
-class OwnClock(Pacing):
+class OwnClock(Wall):
     """Publishes /clock: `speed_factor` valve seconds per wall second, no more and no less."""
 
     def __init__(
@@ -151,8 +161,8 @@ class OwnClock(Pacing):
     ) -> None:
         """Prepare the publisher; `speed_factor` is fixed for the life of the node."""
         super().__init__(node, period, take)
+        self.speed_factor = speed_factor
         self._samples = 0
-        self._wall_period = period / speed_factor
         self._clock = node.create_publisher(ClockMessage, '/clock', QoSProfile(depth=10))
 
     @property
@@ -160,38 +170,12 @@ class OwnClock(Pacing):
         """Time on /clock [s]."""
         return CLOCK_START + self._samples * self._period
 
-    def start(self, jumped: Callable[[bool], None]) -> None:
-        """Make the wall timer that looks what is due."""
-        self._origin: float | None = None
-        clock = Clock(clock_type=ClockType.STEADY_TIME)
-        self._node.create_timer(max(self._wall_period, 1e-3), self._tick, clock=clock)
-
     def step(self) -> None:
         """Publish the time, then the sample of that time."""
         stamp = Time(nanoseconds=round(self.now * SECOND)).to_msg()
         self._clock.publish(ClockMessage(clock=stamp))
         self._take()
         self._samples += 1
-        if self._origin is not None:
-            self._origin += self._wall_period
-
-    def _tick(self) -> None:
-        """Take what is due since the last sample, at most some 20 ms of it at a time."""
-        if self.paused:
-            return
-        if self._origin is None:  # time before the first tick was the making of other nodes
-            self._origin = time.monotonic() - self._wall_period
-        due = int((time.monotonic() - self._origin) / self._wall_period)
-        lost = due - max(1, round(CATCH_UP / self._wall_period))
-        if lost > 0:
-            self.missed_periods += lost
-            self._origin += lost * self._wall_period
-            due -= lost
-        for _ in range(min(due, max(1, round(0.02 / self._wall_period)))):
-            self.step()
-
-    def _skip_pause(self) -> None:
-        self._origin = time.monotonic()
 
 
 class SimTime(Pacing):

@@ -200,6 +200,7 @@ class ValvePlant(Node):
             'paused': self.pacing.paused,
             'samples': self.samples,
             'missed periods': self.missed_periods,
+            'late samples': self.pacing.late_samples,
             'command [%]': self.command,
             'command age [s]': f'{age:.3f}',
             'refused commands': self.refused_commands,
