@@ -248,7 +248,9 @@ def main(seconds, steps, cases):
         count, rate = map(float, case.split('@'))
         say_paced(int(count), rate, measure(paced, int(count), rate, seconds))
         held = measure(bare, rate, min(seconds, MOST_BARE))
-        print(f'      a loop that only looks at the clock slept through {held:.3f} % of the periods')
+        print(
+            f'      a loop that only looks at the clock slept through {held:.3f} % of the periods'
+        )
     ways = ((False, 'one process'), (True, 'two processes'))
     for own_process, words in ways if steps else ():
         found = measure(lockstep, own_process, steps)

@@ -44,8 +44,11 @@ def ip_calibration(rng: Rng, valve: Physics, length: float) -> Changes:
 
 
 def ip_nonlinearity(rng: Rng, valve: Physics, length: float) -> Changes:
-    """Bow the transducer's line by this much at mid span."""
-    return {'ip_bow': either_sign(rng, 1.0, 15.0)}
+    """Bow the transducer's line by this much at mid span, by a parabola or a power."""
+    bow = either_sign(rng, 1.0, 15.0)
+    if rng.random() < 0.6:
+        return {'ip_bow': bow}
+    return {'ip_power': float(np.log(0.5 + 0.01 * bow) / np.log(0.5))}
 
 
 def supply_limit(rng: Rng, valve: Physics, length: float) -> Changes:
@@ -106,10 +109,11 @@ def quick_exhaust(rng: Rng, valve: Physics, length: float) -> Changes:
 
 
 def rate_limit(rng: Rng, valve: Physics, length: float) -> Changes:
-    """Limit the speed of p2, or of the stem by direction."""
+    """Limit the speed of p2, both ways or one, or of the stem by direction."""
     rate = log_uniform(rng, 1.0, 30.0)
     if rng.random() < 0.6:
-        return {'p2_rate_up': rate, 'p2_rate_down': rate}
+        ways = ('p2_rate_up', 'p2_rate_down')
+        return dict.fromkeys(ways if rng.random() < 0.5 else (str(rng.choice(ways)),), rate)
     return {'v_up': rate, 'v_down': rate * log_uniform(rng, 0.4, 2.5)}
 
 

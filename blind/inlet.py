@@ -86,6 +86,8 @@ def inlet(u, s, q, h, t):
         error = u - s[at.SMOOTH]
         s[at.SMOOTH] += h / q.smoothing * error * (1.0 + abs(error) / q.smoothing_error)
         u = s[at.SMOOTH]
+    if q.ip_power != 1.0:
+        u = 100.0 * (0.01 * max(u, 0.0)) ** q.ip_power
     u = q.ip_zero + q.ip_span * u + q.ip_bow * 4e-4 * u * (100.0 - u)
     if q.hysteresis_kind > 0.0 and q.hysteresis_at == 0.0:
         u = hysteresis(u, s, q)

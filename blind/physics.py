@@ -26,6 +26,7 @@ class Physics(NamedTuple):
     ip_zero: float = 0.0
     ip_span: float = 1.0
     ip_bow: float = 0.0
+    ip_power: float = 1.0
     supply: float = FAR
     loop_gain: float = 0.0
     loop_reset: float = 0.0

@@ -39,7 +39,7 @@ class Recorder:
     outliers : int
         Single wild values.
     loss : float
-        Share of lost values.
+        Share of lost values, commands as well.
     as_sent : bool
         Whether the column u holds the commands as they were sent, one for each row, instead of
         the last one that had arrived when the row's signals were sampled.

@@ -207,7 +207,11 @@ def write(blind: Blind, rng: Rng, name: str, signals: tuple[str, ...], folder: P
     period = recorder.period
     part = record_part(plan, recorder)
     found = measured(blind.trace, recorder, signals, rng)
+    commands = plan.u[part].copy()
     columns = {'u': plan.u[command_beside(blind)], **found}
+    lost = rng.random(blind.times.size) < recorder.loss
+    lost[: part.start + 1] = False  # nothing is known to hold before the first
+    commands[lost[part]] = columns['u'][lost] = np.nan
     stamps = blind.times - part.start * period
     jitter = np.clip(rng.standard_normal(stamps.size), -3, 3) * recorder.stamp_jitter * period
     nominal = period * (np.arange(stamps.size) - part.start)
@@ -218,7 +222,7 @@ def write(blind: Blind, rng: Rng, name: str, signals: tuple[str, ...], folder: P
         write_bag(
             folder / 'records' / name,
             nominal[part] + 1e-4,
-            plan.u[part],
+            commands,
             (blind.times - part.start * period + 2e-4 + np.abs(jitter))[part],
             {signal: values[part] for signal, values in found.items()},
         )

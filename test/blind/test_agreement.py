@@ -82,6 +82,9 @@ SAME = {
 }
 
 OTHER_FORMS = [
+    ('ip_nonlinearity', {'ip_power': 0.8}, {'bow': 0.0, 'exponent': 0.8}),
+    ('rate_limit', {'p2_rate_up': 3.0}, {'pressure_rate': 1000.0, 'filling_rate': 3.0}),
+    ('rate_limit', {'p2_rate_down': 3.0}, {'pressure_rate': 1000.0, 'emptying_rate': 3.0}),
     (
         'presliding',
         {'bristle': 4.0, 'bristle_stribeck': 0.03},

@@ -8,6 +8,7 @@ import numpy as np
 
 from ..model.pipeline import Array
 from ..recordings.recording import OUTPUTS
+from .adequacy import leftover
 from .fitting import Fitter, Problem, Valve
 from .seen import ENOUGH_STEPS, LEAST_EACH
 from .stages import Group
@@ -35,16 +36,29 @@ def put_in_its_period(fitter: Fitter, group: Group, valve: Valve, problem: Probl
     stretches = fitter.bench.stretches
     sent = [stretch.u for stretch in stretches]
     each = shifts_of_steps(fitter, valve, problem)
-    told = np.concatenate([shifts[errors < SURE] for _, shifts, errors in each])
+    found_early = [
+        steps[np.isin(steps, stretch.unsure) & (shifts - valve.values['phase'] > 0.5)]
+        for stretch, (steps, shifts, _) in zip(stretches, each, strict=True)
+    ]
+    told = np.concatenate(
+        [
+            shifts[(errors < SURE) & ~np.isin(steps, stretch.unsure)]
+            for stretch, (steps, shifts, errors) in zip(stretches, each, strict=True)
+        ]
+    )
     early, on_time = (int(np.sum(np.abs(told - whole) < WHOLE)) for whole in (1.0, 0.0))
     if (
         told.size < ENOUGH_STEPS
         or min(early, on_time) < LEAST_EACH
         or early + on_time < MOST * told.size
     ):
-        for stretch, u in zip(stretches, sent, strict=True):
-            stretch.send(u)
-        return valve
+        if not any(steps.size for steps in found_early):
+            for stretch, u in zip(stretches, sent, strict=True):
+                stretch.send(u)
+            return valve
+        for stretch, steps in zip(stretches, found_early, strict=True):
+            stretch.put(steps, True)
+        return fitter.refined(valve, problem)
     sooner = on_time > RARE * early
     for stretch, (steps, shifts, errors) in zip(stretches, each, strict=True):
         # those that are hardly told stay with the most
@@ -89,7 +103,10 @@ def shifts_of_steps(
     moved = [results(index) for index in range(max(own.size for own in steps))]
     plain = results(-1)
     ends = np.cumsum([stretch.u.size for stretch in stretches])[:-1]
-    residuals = np.split(fitter.residuals(valve, signal, drive), ends)
+    residual = fitter.residuals(valve, signal, drive)
+    left = leftover(residual)
+    coarser = math.sqrt(max(left.floor, 1.0) * left.inflation)  # of one white sample
+    residuals = np.split(residual, ends)
     found = []
     for index, (stretch, own, residual) in enumerate(
         zip(stretches, steps, residuals, strict=True)
@@ -102,7 +119,7 @@ def shifts_of_steps(
         # without that caution again, with its own error
         kept = np.minimum(np.diag(covariance), 1.0 - 1e-9)
         shifts = valve.values['phase'] + covariance @ (there @ residual) / (1.0 - kept)
-        found.append((own, shifts, np.sqrt(kept / (1.0 - kept))))
+        found.append((own, shifts, coarser * np.sqrt(kept / (1.0 - kept))))
     return found
 
 

@@ -101,6 +101,24 @@ def find_base(
     return fitter.refined(min(found, key=by_cost), problem)
 
 
+def on_other_side(fitter: Fitter, group: Group, valve: Valve) -> Valve:
+    """Return a valve with an effect in p1, on the other side of the sample if clearly better.
+
+    Behind a positioner the base valve does not show whether p1 answers at the sample that shows
+    the command or at the next.
+    """
+    phase = fitter.phase
+    if group.stages != ('u-p1',) or phase not in (EARLY, LATE):
+        return valve
+    fitter.phase = LATE if phase == EARLY else EARLY
+    there = replace(valve, values={**valve.values, 'phase': min(fitter.phase.upper, 0.0)})
+    there = fitter.fit(there, fitter.problem(group, there))
+    if there.cost < valve.cost - CLEARLY:
+        return there
+    fitter.phase = phase
+    return valve
+
+
 def _settle_phase(fitter: Fitter, group: Group, valve: Valve) -> None:
     """Find out whether p1 answers at the sample that shows the command or at the next."""
     lag = next(each for each in group.candidates() if each.effect == LAG)
@@ -117,7 +135,11 @@ def _settle_phase(fitter: Fitter, group: Group, valve: Valve) -> None:
 
     early, late = (fitted(valve, [{}], phase) for phase in (EARLY, LATE))
     lags_early, lags_late = (fitted(lagging, lag.starts({}), phase) for phase in (EARLY, LATE))
-    answers_late = early.cost > late.cost and lags_early.cost > lags_late.cost - CLEARLY
+    # a lag of 0 is none: the search with one may have ended elsewhere
+    best_early, best_late = (
+        min(one.cost, other.cost) for one, other in ((early, lags_early), (late, lags_late))
+    )
+    answers_late = early.cost > late.cost and best_early > best_late - CLEARLY
     fitter.phase = LATE if answers_late else EARLY
     on_time = replace(early, values={**early.values, 'phase': 0.0})
     results = fitter.results(on_time, ())

@@ -18,6 +18,7 @@ from ..recordings.recording import OUTPUTS, Recording
 from .adequacy import LOWEST
 from .errors import DiagnosisError
 from .readings import (
+    bridged,
     coarse_step,
     filled,
     resolution_of,
@@ -31,6 +32,8 @@ from .readings import (
 )
 from .stretch import CAUGHT, Grid, HELD, ON_TIME, RESTS, Stretch
 
+LEAST_PART = 20
+"""A part of no more samples between two gaps tells nothing."""
 OUTLIER = 6.0
 """A single value further than this from both its neighbours is an outlier [noise]."""
 JITTER = 0.1
@@ -67,14 +70,10 @@ class Bench:
                 'no output is measured in all recordings: expected p1, p2 or x beside u'
             )
         self.stretches = [
-            Stretch(
-                recording.time[part] - recording.time[part][0],
-                np.array(recording.u[part]),
-                {name: np.array(recording.output(name)[part]) for name in self.signals},
-            )
+            self._stretch(recording, part)
             for recording in recordings
             for part in recording.segments
-            if part.stop - part.start > 20
+            if part.stop - part.start > LEAST_PART
         ]
         self.noise = {
             name: self._noise_of([s.measured[name] for s in self.stretches])
@@ -112,6 +111,18 @@ class Bench:
         self.size = sum(stretch.u.size for stretch in self.stretches)
         steps = [np.diff(stretch.time) for stretch in self.stretches]
         self.period = float(np.median(np.concatenate(steps))) if steps else 0.0
+
+    def _stretch(self, recording: Recording, part: slice) -> Stretch:
+        """Return a part of a recording without a gap."""
+        lost = np.array(recording.quality.lost_commands, dtype=np.intp) - part.start
+        sent, unsure = bridged(
+            np.array(recording.u[part]), lost[(lost >= 0) & (lost < part.stop - part.start)]
+        )
+        time = recording.time[part] - recording.time[part][0]
+        measured = {name: np.array(recording.output(name)[part]) for name in self.signals}
+        stretch = Stretch(time, sent, measured, unsure=unsure)
+        stretch.hide(unsure - 1)
+        return stretch
 
     def run(
         self,

@@ -11,7 +11,7 @@ from ..identification.watch import Progress, Stop
 from . import dead_time, odds
 from .adequacy import leftover
 from .base_valve import find_base
-from .coarse import COARSE, rounded
+from .coarse import rounded
 from .fitting import Fitter, GENERATIONS, NARROW, Valve
 from .ladder import climb, concluded, excused, Ladder, Rung
 from .stages import Group
@@ -81,7 +81,7 @@ def climb_all(
                 progress=_within(tell, share + width, 0.0, f'{text} again'),
                 stops=stops,
             )
-            if fitter.bench.step_of_x and any(each.effect == COARSE for each in candidates):
+            if fitter.bench.step_of_x and any(each.effect == odds.COARSE for each in candidates):
                 ladder = rounded(fitter, ladder, candidates, again)
             elif candidates and ladder.outcome == 'unknown_effect':
                 first, ladder = ladder, replace(ladder, complete=False)

@@ -14,10 +14,9 @@ from . import odds
 from .adequacy import leftover
 from .fitting import Fitter
 from .ladder import concluded, Ladder, Rung
+from .odds import COARSE
 from .readings import OFF
 from .stages import Candidate
-
-COARSE = 'sensor_quantisation'
 
 
 def rounded(

@@ -20,8 +20,8 @@ from .conditions import Place, places
 from .errors import DiagnosisError
 from .fitting import Fitter, Valve
 from .intervals import intervals
-from .ladder import Ladder
-from .proof import prove
+from .ladder import concluded, Ladder
+from .proof import closed, Gap, prove
 from .result import Diagnosis, Named
 from .stages import groups
 from .unknowns import complete
@@ -96,6 +96,12 @@ def diagnose(
     tell(0.92, 'holding out')
     floors = {ladder.group.signal: ladder.after.floor for ladder in ladders}
     gaps = prove(fitter, parts, base, augmented, floors)
+    if empty := [each for each in ladders if each.rungs and _closes_nothing(gaps, each)]:
+        augmented = _without(augmented, base, empty)
+        ladders = [
+            concluded(replace(each, rungs=())) if each in empty else each for each in ladders
+        ]
+        gaps = prove(fitter, parts, base, augmented, floors)
     tell(0.97, 'writing down')
     return Diagnosis(
         recordings=tuple(recordings),
@@ -163,6 +169,8 @@ def _refuse_useless(bench: Bench) -> None:
 
 
 LEAST_SAMPLES, MOST_SAMPLES = 200, 20_000
+LEAST_HELD = 0.3
+"""A name that closes less of the gap on data it was not fitted to is withdrawn."""
 
 
 def _known(valve: Valve, spec: ValveSpec | None) -> Valve:
@@ -194,6 +202,27 @@ def _named(
             own = {n: s for n, s in spans.items() if n.startswith(f'{rung.effect}.')}
             named.append(Named(rung, {n: ladder.valve.values[n] for n in own}, own))
     return tuple(named)
+
+
+def _closes_nothing(gaps: Mapping[str, Gap], ladder: Ladder) -> bool:
+    """Tell whether a name closes next to nothing of its signal on data it was not fitted to."""
+    gap = gaps[ladder.group.signal]
+    known = gap.closed
+    if known is None:
+        known = closed(gap.before.fitted, gap.after.fitted, gap.noise)
+    return known is not None and known < LEAST_HELD
+
+
+def _without(valve: Valve, base: Valve, ladders: Sequence[Ladder]) -> Valve:
+    """Return a valve without what some ladders had added, there as the base valve."""
+    gone = {rung.effect for ladder in ladders for rung in ladder.rungs}
+    own = [unknown.name for ladder in ladders for unknown in ladder.group.unknowns(1)]
+    return replace(
+        valve,
+        values={**valve.values, **{name: base.values[name] for name in own}},
+        effects=tuple(name for name in valve.effects if name not in gone),
+        candidates=tuple(each for each in valve.candidates if each.effect not in gone),
+    )
 
 
 def _places(fitter: Fitter, ladders: Sequence[Ladder]) -> tuple[Place, ...]:

@@ -11,7 +11,7 @@ from ..model.effects import CATALOGUE
 from . import odds
 from .adequacy import Leftover, leftover
 from .arrivals import put_in_its_period
-from .base_valve import find_base
+from .base_valve import find_base, on_other_side
 from .fitting import by_cost, Fitter, Valve
 from .loosening import loosened
 from .race import deepened, race, rebased
@@ -145,7 +145,13 @@ def climb(
         if worth(left):
             return candidates
         hidden = group.stages == ('p2-x',) and not (rungs or named or carried > odds.SPOTLESS)
-        return [each for each in candidates if hidden and CATALOGUE[each.effect].imitated]
+        stepped = not rungs and bool(fitter.bench.steps_of_x)
+        return [
+            each
+            for each in candidates
+            if (hidden and CATALOGUE[each.effect].imitated)
+            or (stepped and each.effect == odds.COARSE)
+        ]
 
     now, before = base, base_left = seen(valve)
     with suppress(*stops):
@@ -179,6 +185,7 @@ def climb(
                 rung = judged(fitter, group, now, before, runners)
             if rung is None or rung.effect not in {each.effect for each in sought(before)}:
                 break
+            rung = _with(fitter, group, rung, on_other_side(fitter, group, rung.valve))
             rung = _on_time(fitter, group, rung)
             gained, first = rung.gains[rung.effect], not rungs
             if not odds.strong(
@@ -188,7 +195,8 @@ def climb(
                 break
             if rungs:
                 both = reconsidered(fitter, group, base, [*rungs, rung])
-                if not odds.needed(base_left, before, rung.closed, both[-1].after):
+                names = [each.effect for each in both]
+                if not odds.needed(base_left, before, rung.closed, both[-1].after, names):
                     guess = guess or rung
                     break
                 rungs, rung = both[:-1], both[-1]
@@ -210,6 +218,13 @@ def climb(
 def _on_time(fitter: Fitter, group: Group, rung: Rung) -> Rung:
     """Return a step with commands where its valve shows that they came."""
     valve = put_in_its_period(fitter, group, rung.valve, fitter.problem(group, rung.valve))
+    return _with(fitter, group, rung, valve)
+
+
+def _with(fitter: Fitter, group: Group, rung: Rung, valve: Valve) -> Rung:
+    """Return a step that ends at another valve."""
+    if valve is rung.valve:
+        return rung
     after = leftover(fitter.residuals(valve, group.signal))
     return replace(rung, valve=valve, after=after, closed=rung.before.closed_by(after))
 
@@ -290,7 +305,9 @@ def judged(
     enough = odds.MORE_ENOUGH if little else odds.ENOUGH
     # where a few far errors were the only reason to look, they must be gone
     only_far = little and after.far >= odds.LEAST_FAR
-    if gains[candidate.effect] < enough or change < least or only_far:
+    # what has the colour of noise is misfit only where an effect takes it away
+    still_coloured = odds.coloured(before) and after.inflation > odds.WHITER * before.inflation
+    if gains[candidate.effect] < enough or change < least or only_far or still_coloured:
         return None
     closed = before.closed_by(after)
     return Rung(

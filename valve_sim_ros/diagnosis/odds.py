@@ -19,12 +19,19 @@ excess before it, and the part of it that it closes."""
 MORE_SHARE, FAR_OFF = 0.02, 2.0
 """Least part of the whole gap that it closes, unless it leaves nothing but noise; the excess that
 is far more than noise: it may close less of that, if both together explain the gap."""
+ALIKE_SHARE = 0.05
+"""Least part of the whole gap where it is declared to look like one named before."""
+COLOURED, COLOUR, WHITER = 1.5, 2.0, 0.6
+"""Mean square and samples per independent value beyond which noise seems coloured; and by how much
+an effect must bring the latter down, if that was misfit."""
 MORE_FAR = 10
 """So many errors beyond any noise are as good a reason to look for it as an excess."""
 SPOTLESS = 0.1
 """Excess that is nothing but noise."""
 NEGLIGIBLE = 1.0 / 3.0
 """An effect of less than this part of its least usual size is another run of the base valve."""
+COARSE = 'sensor_quantisation'
+"""The effect that the values of x show."""
 LASTING = (
     'ip_calibration',
     'ip_nonlinearity',
@@ -78,7 +85,12 @@ def suspicious(left: Leftover, group: Group, mixed: bool) -> bool:
     if group.has_stem:
         alone = 'u-p1' in group.stages
         return left.excess >= (LEAST_IF_ALONE if alone else least) or left.far >= LEAST_FAR
-    return left.excess >= least
+    return left.excess >= least or coloured(left)
+
+
+def coloured(left: Leftover) -> bool:
+    """Tell whether what looks like coloured noise may as well be misfit all over the record."""
+    return left.mean_square > COLOURED and left.inflation > COLOUR and left.excess < SPOTLESS
 
 
 def gain(before: float, after: Valve, inflation: float, count: int) -> float:
@@ -148,11 +160,19 @@ def strong(
     return gained >= MORE_ENOUGH and closed >= least
 
 
-def needed(base: Leftover, before: Leftover, closed: float, after: Leftover) -> bool:
-    """Tell whether a further effect closes enough of the gap, `after` being both together."""
+def needed(
+    base: Leftover, before: Leftover, closed: float, after: Leftover, names: Sequence[str]
+) -> bool:
+    """Tell whether a further effect closes enough of the gap, `after` being both together.
+
+    One that looks like another of the `names` may only make up for a law that is not quite right.
+    """
     share = base.closed_by(after) - base.closed_by(before)
     left = base.closed_by(before) < MOSTLY or before.excess > FAR_OFF
     explained = left and base.closed_by(after) >= MOSTLY
+    *others, last = names
+    if any(look_alike(last, other) for other in others):
+        return share >= ALIKE_SHARE and (closed >= MORE_CLOSED or explained)
     matters = share >= MORE_SHARE or after.excess <= SPOTLESS
     return matters and (closed >= MORE_CLOSED or explained)
 

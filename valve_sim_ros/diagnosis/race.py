@@ -21,7 +21,7 @@ from .fitting import by_cost, eased, FAINT, Fitter, LONG, Problem, SHORT, Valve
 from .seen import calibration_seen, friction_seen
 from .stages import Candidate, Group
 from .starts import friction_grid, STEMS
-from .stretch import RESTS
+from .stretch import PUT_TO_REST, RESTS
 
 ROUNDS = ((40, 5), (10, 14), (4, 30))
 """Rounds of a race where costs are rugged: how many still run, and for how many generations."""
@@ -231,7 +231,8 @@ def _screened(
         return sorted(each, key=by_cost)[:count]
 
     found = best(problem, SCREENED)
-    if CATALOGUE[candidate.effect].rugged:
+    # in a second look the stem is put to rest for all
+    if CATALOGUE[candidate.effect].rugged and PUT_TO_REST.isdisjoint(fitter.drive):
         found += _slip_by_slip(fitter, there, [one for some in starts for one in some], problem)
     elif way != problem:
         found += [fitter.fit(each, way, SHORT) for each in best(way, 1)]

@@ -32,6 +32,8 @@ of the command beyond which x may bend [%]."""
 LARGE, UNMOVED, ANSWERED = 16.0, 4.0, 0.5
 """A step of p1 that tells when it came; p1 has not moved yet; and part of it seen at once [noise,
 noise, share]."""
+CREEP = 2.0
+"""Between two lost commands one that creeps moves by no more than so many times its pace."""
 Mask = npt.NDArray[np.bool_]
 Rows = npt.NDArray[np.intp]
 
@@ -42,6 +44,24 @@ def filled(values: Array) -> Array:
     if not known.size:
         return values
     return np.interp(np.arange(values.size), known, values[known])
+
+
+def bridged(u: Array, lost: Rows) -> tuple[Array, Rows]:
+    """Return commands of which some were `lost`, and the steps that may have come with one.
+
+    Lost commands of one that creeps lie on a straight line.
+    """
+    sent, unsure = u.copy(), []
+    for run in np.split(lost, np.flatnonzero(np.diff(lost) > 1) + 1) if lost.size else ():
+        before, after = run[0] - 1, run[-1] + 1
+        if before < 1 or after + 1 >= u.size or u[after] == u[before]:
+            continue
+        creep = max(abs(u[before] - u[before - 1]), abs(u[after + 1] - u[after]))
+        if abs(u[after] - u[before]) <= CREEP * creep * (after - before):
+            sent[run] = np.interp(run, [before, after], u[[before, after]])
+        else:
+            unsure.append(after)
+    return sent, np.array(unsure, dtype=np.intp)
 
 
 def smooth(x: Array, noise: float) -> Array:

@@ -50,7 +50,8 @@ class Stretch:
     what was before the record, plays and friction remember it, and so the valve receives those as
     measured. `speed` is that of a stem that moves at the beginning [%/s], `held` is x smoothed
     between its slips. `shown` are the commands of the recording, where `u` are those that the
-    valve is taken to have received.
+    valve is taken to have received; nobody knows whether the steps at the samples `unsure` came
+    with a command that was lost just before.
     """
 
     time: Array
@@ -62,6 +63,7 @@ class Stretch:
     begins: dict[str, Array] = field(default_factory=dict)
     speed: float = 0.0
     held: Array = field(default_factory=lambda: np.empty(0))
+    unsure: Rows = field(default_factory=lambda: np.empty(0, dtype=np.intp))
     _grids: dict[Any, Grid] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -106,12 +108,17 @@ class Stretch:
         self._grids.clear()
 
     def put(self, steps: Rows, sooner: bool) -> None:
-        """Let recorded steps of the command come a sample earlier or later, unseen in p1 there."""
+        """Let steps of the command come a sample earlier or later, unseen in p1 there."""
+        self.hide(steps - sooner)
+        self.send(shifted(self.u, steps, sooner))
+
+    def hide(self, rows: Rows) -> None:
+        """Let p1 say nothing where it answers the commands of some samples, at once or next."""
+        rows = np.concatenate([rows, rows + 1])
         for each in (self.measured, self.counts):
             if 'p1' in each:
                 each['p1'] = each['p1'].copy()
-                each['p1'][steps - sooner] = np.nan
-        self.send(shifted(self.shown, steps, sooner))
+                each['p1'][rows[rows < self.time.size]] = np.nan
 
     def _moved(self, phase: float, drive: tuple[str, ...]) -> Grid:
         n = self.time.size

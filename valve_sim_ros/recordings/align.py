@@ -272,6 +272,7 @@ def _joined(
             ),
             head_trimmed=head,
             doubtful_commands=tuple((rows[rows > 0]).tolist()),
+            lost_commands=tuple((commands.lost[commands.lost >= head] - head).tolist()),
             decided_commands=commands.decided,
             command_offset=commands.offset,
             command_offset_range=commands.offset_range,

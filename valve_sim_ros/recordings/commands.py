@@ -31,6 +31,8 @@ LARGEST_ODDS = 25.0
 MOST_SILENT = 2.0 / 3.0
 """Where more of the commands than this share bring no clear answer (x while it sticks, p2 of a
 large chamber), the few clear ones may as well be something else: the offset is not estimated."""
+PERIODIC = 0.9
+"""Where this share of the samples comes with a command, the others have lost theirs."""
 AMBIGUOUS = 1e-3
 """Commands stamped so close to a sample [s] may have been used one sample earlier or later."""
 
@@ -53,6 +55,8 @@ class Hold:
         Samples with which commands begin that may as well begin one sample earlier or later.
     decided : int
         Commands whose sample the outputs decided.
+    lost : ndarray, shape (l,)
+        Samples without a command of their own where nearly all have one.
     """
 
     command: Array
@@ -61,6 +65,7 @@ class Hold:
     dead_samples: int
     doubtful: Index
     decided: int
+    lost: Index
 
 
 def hold(
@@ -121,7 +126,17 @@ def hold(
         dead,
         rows[events[doubtful]],
         int(overruled.sum()),
+        _lost(rows, ticks.size),
     )
+
+
+def _lost(rows: Index, samples: int) -> Index:
+    """Return the samples without a command between the first and the last, if they are few."""
+    sent = np.zeros(samples, dtype=bool)
+    sent[rows[rows < samples]] = True
+    inside = slice(int(np.argmax(sent)), samples - int(np.argmax(sent[::-1])))
+    few = sent[inside].mean() >= PERIODIC
+    return inside.start + np.flatnonzero(~sent[inside] & few)
 
 
 def _evidence(

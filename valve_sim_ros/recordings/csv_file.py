@@ -3,6 +3,7 @@
 """Recordings as CSV: a header with t, u and any of p1, p2, x, comment lines after #."""
 
 import csv
+from dataclasses import replace
 import hashlib
 import os
 from pathlib import Path
@@ -19,7 +20,7 @@ from .topics import chosen, Topics
 def read_csv(path: str | os.PathLike[str], topics: Topics | None = None) -> Recording:
     """Read a CSV file with columns t [s], u and any of p1, p2, x [% of span], in any order.
 
-    An empty cell of an output is a lost sample. `topics` renames columns.
+    An empty cell is a lost sample; the command before a lost one holds. `topics` renames columns.
 
     Raises
     ------
@@ -50,10 +51,13 @@ def read_csv(path: str | os.PathLike[str], topics: Topics | None = None) -> Reco
         for name, values in signals.items():
             lost = np.isnan(values) & _empty(rows, header, columns[name][0])
             if name == 'u':
-                refuse_not_finite(name, values, time)
-            else:
-                refuse_not_finite(name, np.where(lost, 0.0, values), time)
-        return Recording(
+                lost[0] = False  # nothing is known to hold there
+                lost_commands = tuple(np.flatnonzero(lost).tolist())
+            refuse_not_finite(name, np.where(lost, 0.0, values), time)
+        held = np.arange(time.size)
+        held[list(lost_commands)] = 0
+        signals['u'] = signals['u'][np.maximum.accumulate(held)]
+        recording = Recording(
             time=time - time[0],
             **signals,
             provenance=Provenance(
@@ -65,6 +69,8 @@ def read_csv(path: str | os.PathLike[str], topics: Topics | None = None) -> Reco
                 comments=comments,
             ),
         )
+        quality = replace(recording.quality, lost_commands=lost_commands)
+        return replace(recording, quality=quality)
     except RecordingError as error:
         raise RecordingError(f'{path}: {error}') from None
 

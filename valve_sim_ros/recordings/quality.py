@@ -125,6 +125,8 @@ class Quality:
     doubtful_commands : tuple of int
         Samples with which commands begin that were sent so close to a tick that they may as well
         begin one sample earlier or later.
+    lost_commands : tuple of int
+        Samples without a command where nearly all have one: the one before is taken to hold.
     decided_commands : int
         Such commands whose sample the outputs themselves decided.
     command_offset : float
@@ -147,6 +149,7 @@ class Quality:
     signals: Mapping[str, SignalQuality] = field(default_factory=dict)
     head_trimmed: int = 0
     doubtful_commands: tuple[int, ...] = ()
+    lost_commands: tuple[int, ...] = ()
     decided_commands: int = 0
     command_offset: float = float('nan')
     command_offset_range: tuple[float, float] = (float('nan'), float('nan'))
@@ -170,6 +173,10 @@ class Quality:
         if self.jitter > 1e-4 * self.period:
             share = 100 * self.jitter / self.period
             lines[0] += f', jitter {milliseconds(self.jitter)} ({share:.2g} %)'
+        if self.lost_commands:
+            lines.append(
+                f'u: {len(self.lost_commands)} samples without a command, the one before holds'
+            )
         if self.loss:
             lines[0] += f', {self.loss:.2g} % lost'
         lines += [f'{name}: {each.text()}' for name, each in self.signals.items()]

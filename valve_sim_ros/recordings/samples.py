@@ -153,6 +153,7 @@ def _assemble(
             gaps=tuple(gaps),
             signals=figures,
             doubtful_commands=tuple(doubtful.tolist()),
+            lost_commands=tuple(np.flatnonzero(lost).tolist()),
             notes=tuple(notes),
         ),
         max_gap=max_gap,

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Bow of the electro-pneumatic converter's static line."""
 
+import math
 from typing import Any
 
 from numba import njit
@@ -10,21 +11,24 @@ from ..declarations import Effect, EffectParameter
 
 
 @njit
-def bowed(value: float, bow: float) -> float:
-    """Return a value with a parabola added that is zero at both ends of the span."""
+def bowed(value: float, bow: float, exponent: float) -> float:
+    """Return a value on a power law, with a parabola added: both leave the ends of the span."""
+    if exponent != 1.0:
+        value = math.copysign(100.0 * abs(value / 100.0) ** exponent, value)
     return value + bow * value * (100.0 - value) / 2500.0
 
 
 @njit
 def command(value: float, state: Any, p: Any, memory: Any, dt: float) -> float:
     """Bend the command by the share before the backlash."""
-    return bowed(value, p[0] * p[1])
+    return bowed(value, p[0] * p[1], 1.0 + (p[2] - 1.0) * p[1])
 
 
 @njit
 def inlet(value: float, state: Any, p: Any, memory: Any, dt: float) -> float:
     """Bend p1 by the share after the backlash."""
-    return bowed(value, p[0] * (1.0 - p[1]))
+    share = 1.0 - p[1]
+    return bowed(value, p[0] * share, 1.0 + (p[2] - 1.0) * share)
 
 
 EFFECT = Effect(
@@ -54,8 +58,20 @@ EFFECT = Effect(
             'Share of it before the backlash',
             starts=(0.5,),
         ),
+        EffectParameter(
+            'exponent',
+            'n',
+            '-',
+            1.0,
+            0.4,
+            2.5,
+            'log',
+            'Power with which p1 follows the command, ends kept',
+            neutral=1.0,
+            starts=(0.7, 0.9, 1.1, 1.4),
+        ),
     ),
-    variants=(('bow', 'upstream'),),
+    variants=(('bow', 'upstream'), ('exponent', 'upstream')),
     slots={'command_slot': command, 'inlet_slot': inlet},
     order=10,
     explanation='The converter meets its ends but not the straight line between them.',

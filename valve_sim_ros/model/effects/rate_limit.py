@@ -18,7 +18,7 @@ UNLIMITED = 1000.0
 def flow(value: Any, state: Any, p: Any, memory: Any, dt: float) -> tuple[float, float]:
     """Return the rate that leads to the exact end of |p2'| <= r."""
     target, rate = value
-    limit = p[0]
+    limit = min(p[0], p[3] if target > state.p2 else p[4])
     excess = abs(state.p2 - target)
     if dt <= 0.0 or rate * excess <= limit:
         return target, rate
@@ -83,11 +83,40 @@ EFFECT = Effect(
             stage='p2-x',
             starts=(1.5, 4.0, 10.0, 25.0),
         ),
+        EffectParameter(
+            'filling_rate',
+            'r_filling',
+            '%/s',
+            UNLIMITED,
+            0.1,
+            UNLIMITED,
+            'log',
+            'Fastest rise of p2',
+            neutral=UNLIMITED,
+            starts=(1.5, 4.0, 10.0, 25.0),
+        ),
+        EffectParameter(
+            'emptying_rate',
+            'r_emptying',
+            '%/s',
+            UNLIMITED,
+            0.1,
+            UNLIMITED,
+            'log',
+            'Fastest fall of p2',
+            neutral=UNLIMITED,
+            starts=(1.5, 4.0, 10.0, 25.0),
+        ),
     ),
     slots={'flow_slot': flow, 'motion_slot': motion},
     stride=0.02,
     order=40,
-    variants=(('pressure_rate',), ('opening_rate', 'closing_rate')),
+    variants=(
+        ('pressure_rate',),
+        ('filling_rate',),
+        ('emptying_rate',),
+        ('opening_rate', 'closing_rate'),
+    ),
     explanation='A restriction, a damper or a small booster limits how fast p2 or the stem moves.',
     symptom='Straight ramps of p2 or x whatever the size of the step.',
     confirm='Compare steps of different sizes: the slopes are equal.',
