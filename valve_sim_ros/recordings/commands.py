@@ -19,8 +19,8 @@ from .quality import Array
 Index = npt.NDArray[np.int64]
 REACH = 8
 """Samples before and behind a command that are looked at."""
-SHIFTS = range(-1, 4)
-"""Answers are looked for from one sample before to three behind the first that may show them."""
+SHIFTS = range(-1, 5)
+"""Answers are looked for from one sample before to four behind the first that may show them."""
 MOST_EVENTS, ENOUGH_EVENTS = 5000, 1000
 """Commands that are looked at one by one; those that tell the offset."""
 FEWEST_ROWS = 7
@@ -145,8 +145,10 @@ def _evidence(
     """Return the log odds of each shift of the answer to each command, shape (m, shifts).
 
     p1 answers with a step, p2 and x with a kink; each shift is judged by how well a smooth curve
-    with such a break fits the samples around.
+    with such a break fits the samples around. Where p1 is measured it tells alone: p2 begins to
+    answer as soon as a command comes, p1 shows it a sample later if it is read just before.
     """
+    outputs = {'p1': outputs['p1']} if 'p1' in outputs else outputs
     odds = np.zeros((events.size, len(SHIFTS)))
     if not events.size or ticks.size < 2 * REACH + 1:
         return odds
@@ -173,6 +175,8 @@ def _evidence(
         count = mask[usable].sum(axis=1)[:, None]
         odds[usable] -= 0.5 * count * np.log(misfits / count + 1e-6)
     odds -= odds.max(axis=1, keepdims=True, initial=-np.inf)
+    # an answer that seems best at the last shift came later still: nobody knows when
+    odds[odds[:, -1] == 0.0] = 0.0
     return np.maximum(odds, -LARGEST_ODDS)
 
 
