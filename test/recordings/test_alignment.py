@@ -7,6 +7,7 @@ import pytest
 from recorded import commands, faults, recorded
 
 from valve_sim_ros.recordings.align import align
+from valve_sim_ros.recordings.arrivals import Arrivals
 from valve_sim_ros.recordings.recording import Provenance
 
 SEEDS = range(3)
@@ -112,3 +113,25 @@ def test_stamps_without_any_regularity_are_used_as_they_are():
     assert not found.quality.regular
     assert 'no regular grid' in '; '.join(found.quality.lines())
     assert len(found) > 0.98 * count
+
+
+@pytest.mark.parametrize('seed', SEEDS)
+@pytest.mark.parametrize('jitter', [0.0, 0.004])
+@pytest.mark.parametrize('dead_samples', [1, 3, 4, 9])
+def test_commands_stay_together_where_p1_is_read_just_before_them(seed, jitter, dead_samples):
+    rng = np.random.default_rng(seed)
+    truth, arrivals = recorded(
+        rng,
+        *commands(rng, COMMANDS, 8.0, 0.0),
+        parameters={'T_g1': 2.0, 'T_g2': 3.0},
+        noise=0.16,
+        jitter=jitter,
+        command_lag=0.001 + jitter,
+        dead_samples=dead_samples,
+    )
+    late = np.concatenate([truth.p1[:1], truth.p1[:-1]])
+    arrivals['p1'] = Arrivals(arrivals['p1'].stamps, late)
+    found = align(arrivals, Provenance())
+    steps, sent = (np.flatnonzero(np.diff(u)) for u in (found.u, truth.u))
+    assert np.unique(steps - sent[: steps.size]).size == 1
+    assert found.quality.decided_commands == 0
