@@ -500,12 +500,16 @@ def test_errors_of_any_size_can_be_compared():
 
 def test_a_further_effect_must_close_part_of_the_whole_gap():
     base, far, near, clean = (Leftover(1.0 + e, 1.0 + e, 1.0, 5000, 1.0) for e in (50, 10, 1, 0))
-    assert odds.needed(base, far, 1.0, clean)
-    assert odds.needed(base, far, 0.3, near)  # much is left, and both together explain it
-    assert not odds.needed(base, near, 0.3, clean)  # enough is explained without it
-    assert not odds.needed(base, near, 0.9, Leftover(1.5, 1.5, 1.0, 5000, 1.0))
+    names = ['air_leak', 'quick_exhaust']
+    assert odds.needed(base, far, 1.0, clean, names)
+    assert odds.needed(base, far, 0.3, near, names)  # much is left, and both explain it
+    assert not odds.needed(base, near, 0.3, clean, names)  # enough is explained without it
+    assert not odds.needed(base, near, 0.9, Leftover(1.5, 1.5, 1.0, 5000, 1.0), names)
     small, noise = (Leftover(1.0 + e, 1.0 + e, 1.0, 5000, 1.0) for e in (0.4, 0.05))
-    assert odds.needed(base, small, 0.9, noise)  # little of the whole, but nothing more is left
+    # little of the whole, but nothing more is left; not if the first law may just not be right
+    assert odds.needed(base, small, 0.9, noise, names)
+    assert not odds.needed(base, small, 0.9, noise, ['ip_nonlinearity', 'ip_calibration'])
+    assert odds.needed(base, far, 0.9, noise, ['ip_nonlinearity', 'ip_calibration'])
 
 
 def test_the_place_of_a_misfit_is_found():

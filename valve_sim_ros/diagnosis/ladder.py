@@ -304,9 +304,11 @@ def judged(
     little = before.excess < odds.LEAST_EXCESS[group.signal]
     enough = odds.MORE_ENOUGH if little else odds.ENOUGH
     # where a few far errors were the only reason to look, they must be gone
-    only_far = little and after.far >= odds.LEAST_FAR
+    only_far = little and min(before.far, after.far) >= odds.LEAST_FAR
     # what has the colour of noise is misfit only where an effect takes it away
-    still_coloured = odds.coloured(before) and after.inflation > odds.WHITER * before.inflation
+    still_coloured = (
+        odds.coloured(group, before) and after.inflation > odds.WHITER * before.inflation
+    )
     if gains[candidate.effect] < enough or change < least or only_far or still_coloured:
         return None
     closed = before.closed_by(after)

@@ -85,12 +85,13 @@ def suspicious(left: Leftover, group: Group, mixed: bool) -> bool:
     if group.has_stem:
         alone = 'u-p1' in group.stages
         return left.excess >= (LEAST_IF_ALONE if alone else least) or left.far >= LEAST_FAR
-    return left.excess >= least or coloured(left)
+    return left.excess >= least or coloured(group, left)
 
 
-def coloured(left: Leftover) -> bool:
-    """Tell whether what looks like coloured noise may as well be misfit all over the record."""
-    return left.mean_square > COLOURED and left.inflation > COLOUR and left.excess < SPOTLESS
+def coloured(group: Group, left: Leftover) -> bool:
+    """Tell whether what looks like coloured noise of a pressure may as well be misfit all over."""
+    seems = left.mean_square > COLOURED and left.inflation > COLOUR and left.excess < SPOTLESS
+    return seems and not group.has_stem
 
 
 def gain(before: float, after: Valve, inflation: float, count: int) -> float:
