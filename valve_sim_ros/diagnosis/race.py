@@ -20,7 +20,7 @@ from .base_valve import find_base
 from .fitting import by_cost, eased, FAINT, Fitter, LONG, Problem, SHORT, Valve
 from .seen import calibration_seen, friction_seen
 from .stages import Candidate, Group
-from .starts import friction_grid, STEMS
+from .starts import friction_grid, grid, STEMS
 from .stretch import PUT_TO_REST, RESTS
 
 ROUNDS = ((40, 5), (10, 14), (4, 30))
@@ -28,8 +28,9 @@ ROUNDS = ((40, 5), (10, 14), (4, 30))
 MOST_STARTS, FEWER_STARTS = 24, 8
 """Up to so many starts of an effect are tried with each level of friction; if there are more, only
 so many of the best."""
-SCREENED, FINISHERS, REFINED = 3, 5, 2
-"""How many starts of a candidate are followed, runners refitted, and refined to the end."""
+SCREENED, SCREENED_IF_SMOOTH, FINISHERS, REFINED = 3, 8, 5, 2
+"""How many starts of a candidate are followed (more without a stem: such fits are quick), runners
+refitted, and refined to the end."""
 DESCENT, FOLLOWED, TURNS, FINEST = 12, 3, 25, 0.3
 """Steps of a descent to single slips; so many of its ends are taken on to all slips, by evolutions
 of so many generations that begin with so little spread [steps of unknowns]."""
@@ -45,7 +46,8 @@ not look like it are not tried."""
 DEEPENED = 3
 """So many effects are searched more deeply where none explains what is left."""
 
-Frictions = Sequence[dict[str, float]]
+Bases = Sequence[dict[str, float]]
+LAGS = ('T_g1', 'T_g2')
 
 
 def race(
@@ -57,7 +59,8 @@ def race(
 ) -> list[Valve]:
     """Return valves with one more effect, best first; the better, the more refitted."""
     seen: dict[str, tuple[float, ...]] = {}
-    frictions: Frictions = ()
+    # without the effect a valve may have found its lags far off
+    bases: Bases = grid([each for each in fitter.unknowns(group) if each.name in LAGS])
     if group.has_stem:
         results = fitter.results(valve)
         # whole slips would hide a swing
@@ -67,7 +70,7 @@ def race(
             'steps': fitter.bench.steps_of_x,
             **calibration_seen(fitter.bench, results),
         }
-        frictions = friction_grid(friction_seen(fitter.bench, results)[0])
+        bases = friction_grid(friction_seen(fitter.bench, results)[0])
     done = 0
 
     def count(runner: Valve) -> Valve:
@@ -77,7 +80,7 @@ def race(
         return runner
 
     def screened(candidate: Candidate) -> Valve:
-        return _screened(fitter, candidate, group, valve, candidate.starts(seen), frictions)
+        return _screened(fitter, candidate, group, valve, candidate.starts(seen), bases)
 
     def evolved(runner: Valve, generations: int) -> Valve:
         more = fitter.evolve(runner, fitter.problem(group, runner), generations)
@@ -207,7 +210,7 @@ def _screened(
     group: Group,
     valve: Valve,
     own: Sequence[dict[str, float]],
-    frictions: Frictions,
+    bases: Bases,
 ) -> Valve:
     """Return the valve with one more effect after a short refit of its group."""
     there = replace(
@@ -222,7 +225,7 @@ def _screened(
         costs = [fitter.scan(there, [{**usual, **start}], way)[0].cost for start in own]
         own = [own[index] for index in np.argsort(costs, kind='stable')[:FEWER_STARTS]]
     starts = [
-        [{**usual, **base, **start} for base in (candidate.balanced(usual, start), *frictions)]
+        [{**usual, **base, **start} for base in (candidate.balanced(usual, start), *bases)]
         for start in own
     ]
 
@@ -230,7 +233,7 @@ def _screened(
         each = [fitter.scan(there, some, way)[0] for some in starts]
         return sorted(each, key=by_cost)[:count]
 
-    found = best(problem, SCREENED)
+    found = best(problem, SCREENED if group.has_stem else SCREENED_IF_SMOOTH)
     # in a second look the stem is put to rest for all
     if CATALOGUE[candidate.effect].rugged and PUT_TO_REST.isdisjoint(fitter.drive):
         found += _slip_by_slip(fitter, there, [one for some in starts for one in some], problem)
