@@ -1,0 +1,398 @@
+# Copyright 2026 The valve_sim_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The bench and what it reads from a record, held against what is known."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+from valves import commands, CREEPING, recording, slow_valve, VALUES
+
+from valve_sim_ros import simulate
+from valve_sim_ros.diagnosis import odds
+from valve_sim_ros.diagnosis.adequacy import leftover
+from valve_sim_ros.diagnosis.base_valve import find_base, starting_valve
+from valve_sim_ros.diagnosis.bench import Bench
+from valve_sim_ros.diagnosis.descent import cost_of
+from valve_sim_ros.diagnosis.fitting import Fitter, Valve
+from valve_sim_ros.diagnosis.intervals import intervals
+from valve_sim_ros.diagnosis.loosening import loosened
+from valve_sim_ros.diagnosis.readings import straightened
+from valve_sim_ros.diagnosis.seen import calibration_seen, friction_seen, mixed_arrivals
+from valve_sim_ros.diagnosis.stages import groups
+from valve_sim_ros.diagnosis.stretch import CAUGHT, HELD, ON_TIME, RESTS
+from valve_sim_ros.diagnosis.unknowns import complete
+from valve_sim_ros.diagnosis.workers import cheapest
+from valve_sim_ros.model.effects import CATALOGUE
+from valve_sim_ros.recordings.recording import Recording
+
+
+def test_the_bench_runs_the_same_valve_as_simulate():
+    record = recording()
+    bench = Bench([record])
+    (result,) = bench.run(complete({**VALUES, 'p1_0': 0.0, 'p2_0': 0.0, 'x_0': 0.0}))
+    for row, name in enumerate(('p1', 'p2', 'x')):
+        np.testing.assert_allclose(result[row], record.output(name), rtol=0, atol=1e-9)
+
+
+def test_a_phase_moves_commands_between_samples():
+    bench = Bench([recording()])
+    on_time, half, whole = (
+        bench.run(complete({**VALUES, 'phase': phase, 'p1_0': 0.0, 'p2_0': 0.0, 'x_0': 0.0}))[0][1]
+        for phase in (0.0, 0.5, 0.999)
+    )
+    np.testing.assert_allclose(whole[:-1], on_time[1:], rtol=0, atol=0.1)
+    assert np.abs(half - 0.5 * (on_time + whole)).max() < 0.2 * np.abs(whole - on_time).max()
+
+
+def test_score_is_the_robust_square_of_the_residual_and_stops_at_its_bound():
+    bench = Bench([recording(noise=0.2)])
+    values = complete({**VALUES, 'f_s': 5.0})
+    residual = np.nan_to_num(bench.residual(bench.run(values), 'x'))
+    whole = bench.score(values, (), 'x')
+    assert whole == pytest.approx(cost_of(residual), rel=1e-9)
+    assert 0.1 * whole < bench.score(values, (), 'x', bound=0.1 * whole) < whole
+
+
+def test_where_pressure_creeps_the_moment_of_a_slip_is_forgiven():
+    slow, _, record = slow_valve(CREEPING, 0.2, T_g1=20.0, T_g2=25.0, f_s=7.0)
+    bench = Bench([record])
+    own, little, much = (
+        bench.residual(bench.run(complete({**slow, 'f_s': f_s})), 'x') for f_s in (7.0, 7.05, 7.5)
+    )
+    assert np.nanmax(np.abs(own)) < 6.0
+    assert np.nanmax(np.abs(little)) < 6.0
+    assert np.nanmax(np.abs(much)) > 10.0
+
+
+def test_what_no_slip_explains_is_not_forgiven():
+    slow, _, record = slow_valve(CREEPING, 0.2, T_g1=20.0, T_g2=25.0, f_s=7.0)
+    bench = Bench([replace(record, x=record.x + 0.1 * (record.x - 45.0))])
+    (own,) = bench.run(complete(slow))
+    (stretch,) = bench.stretches
+    missed = (stretch.counts['x'] - own[2]) / stretch.noise['x']
+    beyond = np.abs(missed) > 2.0
+    assert beyond.sum() > 1000
+    # before a slip and behind it x is where the stem never is
+    np.testing.assert_allclose(bench.residual([own], 'x')[beyond], missed[beyond])
+
+
+def test_a_stem_that_is_let_go_at_a_constant_pressure_is_forgiven_nothing():
+    x = np.concatenate([np.full(100, 20.0), np.full(900, 40.0)])
+    x += 0.2 * np.random.default_rng(4).standard_normal(x.size)
+    p2 = np.full(x.size, 60.0)
+    bench = Bench([Recording(0.2 * np.arange(x.size), p2, p2, p2, x)])
+    free = complete({**VALUES, 'f_s': 0.01, 'p1_0': 60.0, 'p2_0': 60.0, 'x_0': 20.0})
+    residual = bench.residual(bench.run(free, (), ('p1', 'p2')), 'x')
+    assert np.nanmedian(np.abs(residual[200:])) > 50.0
+
+
+@pytest.mark.parametrize('drive', [(), ('p1', 'p2')])
+def test_a_stem_that_is_nearly_free_is_forgiven_nothing(drive):
+    bench = Bench([recording(0.1)])
+    free = {**VALUES, 'T_g1': 0.02, 'T_g2': 0.02, 'f_s': 0.01}
+    free |= {'p1_0': 0.5, 'p2_0': 0.5, 'x_0': 0.5}
+    results = bench.run(complete(free), (), drive)
+    assert np.mean(results[0][3] != results[0][2]) < 0.02
+    assert np.mean(np.abs(bench.residual(results, 'x')) > 5.0) > 0.3
+
+
+def test_a_slip_that_hangs_on_what_noise_leaves_open_of_p2_comes():
+    levels = ((20, 20.0), (300, 70.0), (300, 30.0), (300, 62.0), (300, 25.0))
+    barely = ((300, 66.0), (300, 53.78), (300, 66.0), (300, 30.0))
+    slow, _, record = slow_valve((*levels, *barely), 0.2, f_s=7.0, T_g1=4.0, T_g2=4.0)
+    rng = np.random.default_rng(1)
+    noisy = {n: record.output(n) + 0.2 * rng.standard_normal(len(record)) for n in ('p1', 'p2')}
+    fitter = Fitter(Bench([replace(record, **noisy)]))
+    first, second, stem = groups(('p1', 'p2', 'x'))
+    missed = Valve({**slow, 'f_d1': 0.52})  # the true dead band is 0.5
+    assert leftover(fitter.residuals(missed, 'x')).excess > 5.0
+    found = loosened(fitter, stem, missed)
+    assert leftover(fitter.residuals(found, 'x')).excess < odds.SPOTLESS
+    assert found.cost < 0.1 * fitter.score(missed, 'x')
+    for group in (first, second):
+        spans = intervals(fitter, group, missed, 1.0)
+        for name in ('f_d1', 'T_g1', 'T_g2'):
+            low, high = spans.get(name, (-np.inf, np.inf))
+            middle, width = 0.5 * (low + high), high - low
+            assert name not in spans or abs(found.values[name] - middle) < width
+
+
+def test_a_coarse_sensor_shows_its_step():
+    record = recording(noise=0.2)
+
+    def seen(x):
+        return Bench([Recording(record.time, record.u, x=x)]).steps_of_x
+
+    coarse = 1.37 * np.round(record.x / 1.37)
+    assert seen(coarse)[0] == pytest.approx(1.37, rel=1e-3)
+    late, later = (
+        coarse + noise * np.random.default_rng(2).standard_normal(coarse.size)
+        for noise in (0.1, 0.3)
+    )
+    assert seen(late)[0] == pytest.approx(1.37, rel=1e-3)
+    assert seen(later)[0] == pytest.approx(1.37, rel=1e-3)
+    assert seen(record.x) == ()
+    assert seen(np.round(record.x, 2)) == ()  # as written down, far below the noise
+    first = Bench([Recording(record.time, record.u, x=coarse)])
+    assert first.step_of_x == pytest.approx(1.37, rel=1e-6)
+    for other in (late, record.x, np.round(record.x, 1)):
+        assert Bench([Recording(record.time, record.u, x=other)]).step_of_x == 0.0
+
+
+def test_a_stem_put_to_rest_displaces_the_air_it_would_have_moved():
+    effects = {'chamber_volume.ratio': 1.5, 'chamber_volume.displacement': 1.0}
+    record = recording(**effects)
+    bench = Bench([record])
+    start = {'p1_0': 0.0, 'p2_0': 0.0, 'x_0': 0.0}
+    friction = {'f_s': 200.0, 'f_d': 200.0}  # moves only where it is put
+    stuck = complete({**VALUES, **start, **effects, **friction})
+    (result,) = bench.run(stuck, ('chamber_volume',), ('x',))
+    (free,) = bench.run({**stuck, 'chamber_volume.displacement': 0.0}, ('chamber_volume',), ('x',))
+    dips = np.abs(result[1] - free[1])
+    assert dips.max() > 5.0
+
+
+def test_a_stem_is_put_to_rest_only_where_it_is_far_from_it():
+    record = recording(noise=0.2)
+    x = np.array(record.x)
+    x[np.random.default_rng(3).random(x.size) < 0.02] = np.nan
+    bench = Bench([Recording(record.time, record.u, record.p1, record.p2, x)])
+    start = {'p1_0': 0.0, 'p2_0': 0.0, 'x_0': 0.0}
+    right, stiff = complete({**VALUES, **start}), complete({**VALUES, **start, 'f_s': 9.0})
+    assert bench.score(right, (), 'x', (ON_TIME,)) == bench.score(right, (), 'x')
+    assert bench.score(stiff, (), 'x', (ON_TIME,)) < 0.8 * bench.score(stiff, (), 'x')
+
+
+def test_a_stem_that_is_caught_may_slip_a_little_late():
+    slow, _, record = slow_valve(CREEPING, 0.2, T_g1=20.0, T_g2=25.0, f_s=7.0)
+    bench = Bench([record])
+    late = complete({**slow, 'f_s': 7.25, 'f_d/f_s': slow['f_d/f_s'] * 7.0 / 7.25})
+    right = bench.score(complete(slow), (), 'x')
+    assert bench.score(late, (), 'x', (ON_TIME,)) > right + 200.0
+    assert bench.score(late, (), 'x', (CAUGHT,)) < right + 20.0
+
+
+@pytest.mark.parametrize('drive', [(), (CAUGHT,), (RESTS,)])
+def test_the_search_for_a_base_valve_comes_to_an_end(drive, monkeypatch):
+    begun = []
+
+    def counted(self, valve, *rest):
+        begun.append(rest)
+        assert len(begun) <= 100
+        return valve
+
+    monkeypatch.setattr(Fitter, 'evolve', counted)
+    record = recording(noise=0.2, **{'vibration.amplitude': 3.0, 'vibration.frequency': 0.15})
+    bench = Bench([record])
+    found = find_base(Fitter(bench), groups(bench.signals)[-1], starting_valve(bench), drive)
+    assert begun
+    assert np.isfinite(found.cost)
+
+
+def test_a_stem_is_where_it_was_seen_until_it_travels():
+    bench = Bench([recording(noise=0.2)])
+    (result,) = bench.run(complete({**VALUES, 'p1_0': 0.0, 'p2_0': 0.0, 'x_0': 2.0}))
+    assert result[2, 15] == pytest.approx(0.0, abs=0.3)
+
+
+def test_a_play_nobody_saw_before_the_record_does_not_reach_p2():
+    u = np.concatenate([np.full(200, 90.0), np.full(100, 60.0), commands()[20:]])
+    slow = complete({**VALUES, 'T_g1': 20.0, 'T_g2': 20.0})
+    values = {n: v for n, v in slow.items() if n not in ('phase', 'damping')}
+    neutral = {f'hysteresis.{p.name}': p.neutral for p in CATALOGUE['hysteresis'].parameters}
+    play = {**neutral, 'hysteresis.command_width': 5.0, 'hysteresis.reach': 1.0}
+    parameters = {n: v for n, v in values.items() if '/' not in n}
+    run = simulate(u, parameters={**parameters, 'effects': ['hysteresis'], **play})
+    noise = 0.2 * np.random.default_rng(3).standard_normal((2, u.size))
+    later = slice(250, None)
+    p1, p2 = (run.p1 + noise[0])[later], (run.p2 + noise[1])[later]
+    bench = Bench([Recording(run.t[: p1.size], u[later], p1, p2)])
+    results = bench.run({**slow, **play}, ('hysteresis',))
+    assert np.abs(results[0][0] - run.p1[later])[:50].max() > 3.0
+    assert np.nanmax(np.abs(bench.residual(results, 'p2'))) < 5.0
+
+
+@pytest.mark.parametrize('noise', [0.1, 0.3])
+def test_a_stem_that_creeps_at_first_is_not_held_where_it_seems_to_rest(noise):
+    levels = ((50, 70.0), (150, 20.0), (700, 90.0))
+    slow, _, record = slow_valve(levels, noise, T_g1=12.0, T_g2=60.0, f_s=10.0)
+    bench = Bench([record])
+    assert np.nanmax(np.abs(bench.residual(bench.run(complete(slow)), 'x'))) < 6.0
+
+
+def test_a_first_slip_that_was_seen_on_its_way_goes_on():
+    levels = ((50, 20.0), (300, 31.0), (300, 20.0))
+    slow, truth, record = slow_valve(levels, 0.2, T_g1=12.0, T_g2=60.0, f_s=10.0)
+    slip = int(np.argmax(np.abs(np.diff(truth.x)) > 1.0)) + 1
+    x = np.array(record.x)
+    x[slip] = x[slip - 1] + 1.1  # the sample came while the stem had just left
+    bench = Bench([Recording(record.time, record.u, record.p1, record.p2, x)])
+    off = bench.residual(bench.run(complete(slow)), 'x')
+    assert np.nanmax(np.abs(off[slip + 10 :])) < 6.0  # where p2 creeps, a slip may come late
+
+
+@pytest.mark.parametrize('first', [200, 300])
+def test_a_stem_that_moves_when_the_record_begins_moves_on(first):
+    levels = ((50, 70.0), (500, 20.0), (700, 90.0))
+    slow, truth, record = slow_valve(levels, 0.2, T_g1=12.0, T_g2=60.0, f_s=10.0)
+    bench = Bench([record.slice(0.2 * first, np.inf)])
+    speed = (truth.x[first + 20] - truth.x[first]) / 4.0
+    assert bench.stretches[0].speed == pytest.approx(speed, rel=0.15)
+    start = {f'{name}_0': truth.output(name)[first] for name in ('p1', 'p2', 'x')}
+    result = bench.run(complete({**slow, **start}))
+    assert np.nanmax(np.abs(bench.residual(result, 'x'))) < 6.0
+
+
+def test_a_positioner_can_be_given_any_gain_of_the_catalogue():
+    u = np.repeat([90.0, 5.0], 200)
+    run = simulate(
+        u,
+        parameters={
+            'effects': ['positioner_loop'],
+            'positioner_loop.gain': 3.0,
+            'positioner_loop.overdrive': 1000.0,
+        },
+    )
+    assert run.p1.min() < -150.0
+
+
+def test_a_stem_that_moves_is_smoothed_along_lines_up_to_steps_of_the_command():
+    slopes = (0.0, 0.5, -0.8, 0.1, -0.2)
+    x = 50.0 + np.cumsum(np.repeat(slopes, 40))
+    u = np.repeat(np.arange(5) * 20.0, 40)
+    x[40:] += 8.0  # a slip
+    noisy = x + 0.25 * np.random.default_rng(2).standard_normal(x.size)
+    error = straightened(noisy, np.append(u[1:], u[-1]), 0.25) - x
+    assert np.sqrt(np.mean(error**2)) < 0.45 * 0.25
+    assert np.abs(error).max() < 3.0 * 0.25
+
+
+def test_a_loop_is_seen_through_a_stem_held_where_it_was_measured():
+    loop = {
+        'positioner_loop.gain': 1.5,
+        'positioner_loop.integral_gain': 0.03,
+        'positioner_loop.initial_integral': 4.0,
+        'positioner_loop.overdrive': 20.0,
+    }
+    bench = Bench([recording(noise=0.2, **loop)])
+    wrong_stem = {**VALUES, 'f_s': 12.0, 'p1_0': 0.0, 'p2_0': 0.0, 'x_0': 0.0}
+    values = complete({**wrong_stem, **loop})
+
+    def excess(values, drive):
+        results = bench.run(values, ('positioner_loop',), drive)
+        return leftover(np.nan_to_num(bench.residual(results, 'p1'))).excess
+
+    held = excess(values, (HELD,))
+    assert held < 0.1 * excess(values, ())
+    assert held < 0.1 * excess({**values, 'positioner_loop.initial_integral': 0.0}, (HELD,))
+
+
+def test_the_cheapest_are_right_where_costs_stop_counting_at_a_bound():
+    costs = np.append(np.random.default_rng(3).permutation(200), 200.0)
+
+    def counted(cost, bound):
+        return min(cost, bound + 0.5)
+
+    found = cheapest(counted, costs, 7)
+    assert np.argsort(found)[:7].tolist() == np.argsort(costs)[:7].tolist()
+    assert sorted(found)[:7] == list(range(7))
+    assert found[-1] < costs[-1]  # counted last, it is known to be hopeless
+    assert np.array_equal(cheapest(counted, costs[:5], 7), costs[:5])
+    assert min(cheapest(counted, costs[costs > 50.0], 7, bound=20.0)) == 20.5
+
+
+def test_single_steps_of_the_command_show_whether_arrivals_are_mixed():
+    record = recording(noise=0.1)
+    steps = np.flatnonzero(np.diff(record.u)) + 1
+    some = np.array(record.p1)
+    some[steps[::3]] = some[steps[::3] - 1]
+    each = np.array(record.p1)
+    each[steps] = each[steps - 1]
+    for p1, mixed in ((record.p1, False), (some, True), (each, False)):
+        bench = Bench([Recording(record.time, record.u, p1)])
+        wrong = [np.tile(1.2 * record.u, (4, 1))]  # an effect spoils the base valve
+        assert mixed_arrivals(bench, wrong) == mixed
+
+
+def test_a_record_that_begins_in_motion_starts_at_its_first_sample():
+    rng = np.random.default_rng(4)
+    u = np.repeat(rng.uniform(10.0, 90.0, 30), rng.integers(30, 100, 30))
+    run = simulate(u, parameters={'f_d1': 0.5, 'T_g1': 2.0, 'T_g2': 5.0, 'f_s': 4.0, 'f_d': 2.4})
+    assert run.p2[1] > 5.0
+    noisy = [each + 0.2 * rng.standard_normal(u.size) for each in (run.p1, run.p2)]
+    bench = Bench([Recording(run.t, u, *noisy)])
+    assert bench.stretches[0].first['p2'] == pytest.approx(0.0, abs=1.0)
+    noisy[1][0] = 30.0  # an outlier
+    bench = Bench([Recording(run.t, u, *noisy)])
+    assert bench.stretches[0].first['p2'] < 10.0
+
+
+@pytest.mark.parametrize('rms', [0.1, 0.6])  # moves of up to 13 or 2.2 times the noise
+def test_a_command_that_always_moves_shows_it_too_and_no_lag_passes_for_chance(rms):
+    rng = np.random.default_rng(8)
+    u = 50.0 + 40.0 * np.sin(np.arange(3000) / 30.0)
+    noise = rms * rng.standard_normal(3000)
+    last = np.roll(u, 1)
+    some = np.where(rng.random(3000) < 0.3, last, u)
+    lagging = lfilter([0.5], [1.0, -0.5], u - u[0]) + u[0]
+    for p1, mixed in ((u, False), (some, True), (last, False), (lagging, False)):
+        bench = Bench([Recording(0.2 * np.arange(3000), u, p1 + noise)])
+        assert mixed_arrivals(bench, [np.tile(u, (4, 1))]) == mixed
+
+
+@pytest.mark.parametrize('signals', [('p1', 'p2'), ('p2',)])
+def test_steps_that_came_before_the_sample_are_told_by_what_follows(signals):
+    u = commands(3000)
+    steps = np.flatnonzero(np.diff(u)) + 1
+    early = steps[1::3]
+    sent = u.copy()
+    sent[early - 1] = u[early]
+    values = {n: v for n, v in complete(VALUES).items() if n not in ('phase', 'damping')}
+    run = simulate(sent, parameters={n: v for n, v in values.items() if '/' not in n})
+    noise = 0.2 * np.random.default_rng(6).standard_normal((2, u.size))
+    p1, p2 = run.p1.copy(), run.p2 + noise[1]
+    p1[early - 1] = p1[early - 2]  # taken a little before the command
+    measured = {'p1': p1 + noise[0], 'p2': p2}
+    fitter = Fitter(Bench([Recording(run.t, u, **{name: measured[name] for name in signals})]))
+    valve = starting_valve(fitter.bench)
+    for group in groups(signals):
+        valve = find_base(fitter, group, valve, ())
+    assert np.abs(u - sent).max() > 50.0
+    # only steps too small to tell may be left
+    assert np.abs(fitter.bench.stretches[0].u - sent).max() < 10.0
+    assert leftover(fitter.residuals(valve, 'p2')).excess < 0.05
+
+
+def test_an_outlier_is_a_value_that_neighbours_who_agree_do_not_share():
+    record = recording(noise=0.1)
+    p1 = np.array(record.p1)
+    step = np.flatnonzero(np.abs(np.diff(record.u)) > 20.0)[3]
+    p1[step + 1] += 0.3 * (p1[step + 1] - p1[step])  # a peak of the loop
+    p1[step + 20] += 5.0
+    measured = Bench([Recording(record.time, record.u, p1)]).stretches[0].measured['p1']
+    assert np.isfinite(measured[step + 1])
+    assert np.isnan(measured[step + 20])
+
+
+def test_a_search_for_growing_friction_starts_where_the_stem_holds_as_before():
+    group = groups(('x',))[0]
+    dwell = next(c for c in group.candidates() if c.effect == 'dwell_friction')
+    start = {**dwell.neutral, 'dwell_friction.growth': 0.6}
+    there = dwell.balanced(VALUES, start)
+    assert there['f_s'] * 1.6 == pytest.approx(VALUES['f_s'])
+    assert there['f_s'] * there['f_d/f_s'] == pytest.approx(VALUES['f_s'] * VALUES['f_d/f_s'])
+
+
+def test_data_show_where_a_signal_begins_and_what_holds_the_stem():
+    record = recording(noise=0.3)
+    bench = Bench([record])
+    assert bench.stretches[0].first['x'] == pytest.approx(0.0, abs=0.2)
+    results = bench.run(complete({**VALUES, 'p1_0': 0.0, 'p2_0': 0.0, 'x_0': 0.0}))
+    friction, _ = friction_seen(bench, results)
+    assert friction == pytest.approx(VALUES['f_s'], rel=0.25)
+    off = Bench([Recording(record.time, record.u, record.p1, record.p2, 0.9 * record.x + 4.0)])
+    (_, zero), (_, span) = calibration_seen(off, results).values()
+    assert span == pytest.approx(0.9, abs=0.03)
+    assert zero == pytest.approx(4.0, abs=1.5)
