@@ -28,14 +28,14 @@ def verdict(path: Path, out: Path, seed: int, without: tuple[str, ...]) -> None:
     What goes wrong is noted too, and counts as a wrong verdict until it is made again.
     """
     # here, since the generator must not import what it tests
-    from valve_sim_ros.diagnosis import diagnose
+    from valve_sim_ros.diagnosis import diagnose, PATIENCE
 
     out.mkdir(parents=True, exist_ok=True)
     for name in ('error.txt', 'seconds.json'):
         (out / name).unlink(missing_ok=True)
     began = time.perf_counter()
     try:
-        diagnose([path], seed=seed, without=without).write(out)
+        diagnose([path], seed=seed, without=without, patience=PATIENCE).write(out)
     except Exception:  # whatever a diagnosis may do wrong must not end the study; it is scored
         (out / 'error.txt').write_text(traceback.format_exc(), encoding='utf-8')
     else:

@@ -106,6 +106,17 @@ def test_what_was_found_until_it_is_stopped_is_kept(small_set, tmp_path):
         diagnose(path, progress=stop_at_once)
 
 
+@pytest.mark.slow
+def test_without_patience_the_result_comes_early(small_set, tmp_path):
+    path, _ = small_set[0]
+    out = tmp_path / 'early'
+    words = ['diagnose', str(path), '--out', str(out), '--patience', '0']
+    done = CliRunner().invoke(main, words)
+    assert done.exit_code == 0, done.output
+    assert 'not all was tried' in done.output
+    assert json.loads((out / 'diagnosis.json').read_text())['partial']
+
+
 def stop_at_once(share, text):
     raise Stop
 

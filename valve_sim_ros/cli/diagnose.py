@@ -4,6 +4,7 @@
 
 from pathlib import Path
 import sys
+import time
 
 import click
 
@@ -26,6 +27,13 @@ from .options import INTERRUPTED, progress_bar, topic_option, topics_by_signal
     metavar='EFFECT',
     help='Effect to leave out of the catalogue; repeatable.',
 )
+@click.option(
+    '--patience',
+    type=click.FloatRange(0.0),
+    default=300.0,  # PATIENCE of the diagnosis, which takes seconds to import
+    show_default=True,
+    help='Seconds after which no further search begins; what was found so far is the result.',
+)
 def diagnose_command(
     data: tuple[Path, ...],
     out: Path,
@@ -33,6 +41,7 @@ def diagnose_command(
     topics: tuple[str, ...],
     seed: int,
     without: tuple[str, ...],
+    patience: float,
 ) -> None:
     """Find where the model is wrong on DATA (bags or CSV files) and name the missing effect.
 
@@ -46,6 +55,7 @@ def diagnose_command(
     from ..report.diagnosis import write_report
 
     spec = read_parameters(params) if params else None
+    began = time.monotonic()
     with progress_bar() as progress:
         result = diagnose(
             data,
@@ -55,6 +65,7 @@ def diagnose_command(
             progress=progress,
             without=without,
             interruptible=True,
+            patience=patience,
         )
     for recording in result.recordings:
         for line in recording.quality.lines():
@@ -64,5 +75,5 @@ def diagnose_command(
     written = [*result.write(out), out / 'report.html']
     write_report(result, written[-1])
     click.echo('written: ' + ', '.join(map(str, written)))
-    if result.partial:
+    if result.partial and time.monotonic() < began + patience:
         sys.exit(INTERRUPTED)

@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Find where model and measurement disagree, name the missing effect, add it, show the gap."""
 
-from .diagnose import diagnose
+from .diagnose import diagnose, PATIENCE
 from .errors import DiagnosisError
 from .result import Diagnosis
 
-__all__ = ['Diagnosis', 'DiagnosisError', 'diagnose']
+__all__ = ['PATIENCE', 'Diagnosis', 'DiagnosisError', 'diagnose']

@@ -7,6 +7,7 @@ from contextlib import suppress
 from dataclasses import replace
 import math
 import os
+import time
 
 from ..identification.watch import Progress, Stop
 from ..model.spec import ValveSpec
@@ -38,6 +39,7 @@ def diagnose(
     progress: Progress | None = None,
     without: Collection[str] = (),
     interruptible: bool = False,
+    patience: float = math.inf,
 ) -> Diagnosis:
     """Find where the base valve and a recording disagree, and name the effect that is missing.
 
@@ -58,6 +60,9 @@ def diagnose(
         Effects to leave out of the catalogue.
     interruptible : bool
         Let Ctrl-C do the same as `Stop`.
+    patience : float
+        Wall time after which it does as if it were stopped [s], once the base valve is fitted.
+        With a limit the result may depend on the machine.
 
     Returns
     -------
@@ -71,7 +76,7 @@ def diagnose(
     RecordingError
         If the data cannot be read.
     """
-    tell = progress or _silent
+    tell, end = progress or _silent, time.monotonic() + patience
     stops = (Stop, KeyboardInterrupt) if interruptible else (Stop,)
     try:
         tell(0.0, 'reading')
@@ -89,7 +94,7 @@ def diagnose(
         raise DiagnosisError(
             'stopped before the base valve was fitted; let it run a little longer'
         ) from None
-    ladders, base = climb_all(fitter, parts, valve, without, tell, stops)
+    ladders, base = climb_all(fitter, parts, valve, without, _until(end, tell), stops)
     ladders, late = dead_time.settled(fitter, ladders)
     tell = _heedless(tell)
     augmented = ladders[-1].valve
@@ -120,6 +125,17 @@ def diagnose(
 
 def _silent(share: float, text: str) -> None:
     """Tell nobody."""
+
+
+def _until(end: float, tell: Progress) -> Progress:
+    """Return how to tell what may be stopped, and to stop it at a time [s]."""
+
+    def told(share: float, text: str) -> None:
+        tell(share, text)
+        if time.monotonic() > end:
+            raise Stop
+
+    return told
 
 
 def _heedless(tell: Progress) -> Progress:
@@ -169,6 +185,8 @@ def _refuse_useless(bench: Bench) -> None:
 
 
 LEAST_SAMPLES, MOST_SAMPLES = 200, 20_000
+PATIENCE = 300.0
+"""How long a user waits for the last searches: an x that nothing explains takes minutes [s]."""
 LEAST_HELD = 0.3
 """A name that closes less of the gap, on fitted data and on those held out, is withdrawn."""
 

@@ -47,10 +47,10 @@ class DiagnoseService:
 
     def _diagnose(self, data: Any, options: Mapping[str, Any], folder: str) -> str:
         """Diagnose, publish, write; return the text."""
-        from ..diagnosis import diagnose  # heavy, and few ever ask
+        from ..diagnosis import diagnose, PATIENCE  # heavy, and few ever ask
         from ..report.diagnosis import write_report
 
-        found = diagnose(data, progress=self._progress, **options)
+        found = diagnose(data, progress=self._progress, patience=PATIENCE, **options)
         if folder:
             found.write(folder)
             write_report(found, Path(folder) / 'report.html')
