@@ -192,13 +192,15 @@ def test_the_table_of_all_sets(one_record):
 
 
 def stub(monkeypatch, diagnose):
-    monkeypatch.setitem(sys.modules, 'valve_sim_ros.diagnosis', SimpleNamespace(diagnose=diagnose))
+    monkeypatch.setitem(
+        sys.modules, 'valve_sim_ros.diagnosis', SimpleNamespace(diagnose=diagnose, PATIENCE=300.0)
+    )
 
 
 def test_that_the_left_out_effect_is_passed_on_and_only_there(one_record, monkeypatch):
     asked = []
 
-    def diagnose(paths, seed, without):
+    def diagnose(paths, seed, without, patience):
         asked.append((paths[0].name, seed, without))
         return SimpleNamespace(
             write=lambda out, report: write_json(out / 'diagnosis.json', {'verdict': 'adequate'})
@@ -214,7 +216,7 @@ def test_that_the_left_out_effect_is_passed_on_and_only_there(one_record, monkey
 
 
 def test_that_a_diagnosis_that_breaks_counts_as_failed(one_record, monkeypatch):
-    def diagnose(paths, seed, without):
+    def diagnose(paths, seed, without, patience):
         raise ValueError('no')
 
     stub(monkeypatch, diagnose)

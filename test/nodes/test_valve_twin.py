@@ -180,7 +180,7 @@ class Diagnosis:
 def test_diagnose_stops_nothing(bench, pair, monkeypatch):
     go, asked = threading.Event(), []
 
-    def diagnose(recording, *, spec, progress):
+    def diagnose(recording, *, spec, progress, patience):
         progress(0.1, 'waiting')
         asked.append(recording)
         assert go.wait(20.0)
