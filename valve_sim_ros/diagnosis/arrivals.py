@@ -29,7 +29,8 @@ def put_in_its_period(fitter: Fitter, group: Group, valve: Valve, problem: Probl
     """Put steps of the command a sample elsewhere that came a whole period beside most others.
 
     Where samples are taken just when commands arrive, nobody sees on which side of a sample a step
-    was; p2 shows it. Returns the valve, refitted if any was put elsewhere.
+    was; p2 shows it. It also shows which steps came with a command that was lost just before.
+    Returns the valve, refitted if any step was put elsewhere.
     """
     if group.has_stem or 'p1-p2' not in group.stages or 'p1' in problem[2]:
         return valve
@@ -52,13 +53,13 @@ def put_in_its_period(fitter: Fitter, group: Group, valve: Valve, problem: Probl
         or min(early, on_time) < LEAST_EACH
         or early + on_time < MOST * told.size
     ):
-        if not any(steps.size for steps in found_early):
-            for stretch, u in zip(stretches, sent, strict=True):
-                stretch.send(u)
-            return valve
-        for stretch, steps in zip(stretches, found_early, strict=True):
-            stretch.put(steps, True)
-        return fitter.refined(valve, problem)
+        if any(steps.size for steps in found_early):
+            for stretch, steps in zip(stretches, found_early, strict=True):
+                stretch.put(steps, True)
+            return fitter.refined(valve, problem)
+        for stretch, u in zip(stretches, sent, strict=True):
+            stretch.send(u)
+        return valve
     sooner = on_time > RARE * early
     for stretch, (steps, shifts, errors) in zip(stretches, each, strict=True):
         # those that are hardly told stay with the most
