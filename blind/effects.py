@@ -62,7 +62,8 @@ def positioner_loop(rng: Rng, valve: Physics, length: float) -> Changes:
     if rng.random() < 0.25:
         changes['loop_reset'] = 1.0 / rng.uniform(15.0, 80.0)
     if rng.random() < 0.4 or 'loop_reset' in changes:
-        changes |= {'loop_low': 0.0, 'loop_high': 100.0}
+        changes['loop_low'] = -float(rng.choice((0.0, 5.0, 20.0)))
+        changes['loop_high'] = 100.0 + float(rng.choice((0.0, 5.0, 30.0)))
     return changes
 
 
@@ -118,11 +119,12 @@ def rate_limit(rng: Rng, valve: Physics, length: float) -> Changes:
 
 
 def hysteresis(rng: Rng, valve: Physics, length: float) -> Changes:
-    """Remember, distributed: weighted plays or Bouc-Wen, of the transducer or of x."""
+    """Remember, distributed: plays or Bouc-Wen, of the transducer or of x; or a force on it."""
     size = log_uniform(rng, 0.6, 5.0)
+    kind, place = float(rng.choice((1.0, 2.0))), rng.random()
     return {
-        'hysteresis_kind': float(rng.choice((1.0, 2.0))),
-        'hysteresis_at': float(rng.random() < 0.4),
+        'hysteresis_kind': kind,
+        'hysteresis_at': 2.0 if place < 0.2 and kind == 2.0 else float(place < 0.4),
         'hysteresis_size': size,
         'hysteresis_width': size * rng.uniform(1.0, 2.5),
     }

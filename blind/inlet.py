@@ -28,8 +28,8 @@ def plays(target, s, q):
 
 
 @numba.njit
-def bouc_wen(target, s, q):
-    """Return a signal less its Bouc-Wen memory, rate-independent: dz/du = (1 - |z|..)/width."""
+def remembered(target, s, q):
+    """Return the Bouc-Wen memory of a signal, rate-independent: dz/du = (1 - |z|..)/width."""
     change = target - s[at.HYSTERESIS_INPUT]
     s[at.HYSTERESIS_INPUT] = target
     parts = 1 + int(abs(change) / (0.2 * q.hysteresis_width))
@@ -39,7 +39,7 @@ def bouc_wen(target, s, q):
         backward = 0.5 * (1.0 if du * z > 0.0 else -1.0)
         z += du / q.hysteresis_width * (1.0 - abs(z) * (0.5 + backward))
     s[at.HYSTERESIS] = z
-    return target - q.hysteresis_size * z
+    return z
 
 
 @numba.njit
@@ -47,7 +47,7 @@ def hysteresis(target, s, q):
     """Return the signal behind the distributed hysteresis."""
     if q.hysteresis_kind == 1.0:
         return plays(target, s, q)
-    return bouc_wen(target, s, q)
+    return target - q.hysteresis_size * remembered(target, s, q)
 
 
 @numba.njit

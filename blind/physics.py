@@ -32,7 +32,8 @@ class Physics(NamedTuple):
     loop_reset: float = 0.0
     loop_low: float = -FAR
     loop_high: float = FAR
-    # distributed hysteresis: 1 weighted plays, 2 Bouc-Wen; of the transducer (0) or of x (1)
+    # distributed hysteresis: 1 weighted plays, 2 Bouc-Wen; of the transducer (0), of x
+    # (1), or Bouc-Wen of the force on the stem (2)
     hysteresis_kind: float = 0.0
     hysteresis_at: float = 0.0
     hysteresis_size: float = 0.0

@@ -7,7 +7,7 @@ from math import exp, pi, sin
 import numba
 
 from . import state as at
-from .inlet import pulse
+from .inlet import pulse, remembered
 
 
 @numba.njit
@@ -22,6 +22,8 @@ def push(p2, x, s, q, t):
             force += q.fluid * max(1.0 - 0.01 * x, 0.0) ** 2
     if q.vibration > 0.0:
         force += q.vibration * sin(q.vibration_omega * t)
+    if q.hysteresis_at == 2.0:
+        force -= q.hysteresis_size * remembered(x, s, q)
     force -= q.relaxation * (x - s[at.CREEP])
     if q.area_wave != 0.0:
         force += q.area_wave * sin(2.0 * pi * p2 / q.area_period)

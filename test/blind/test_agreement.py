@@ -27,7 +27,7 @@ SAME = {
     'supply_limit': ({'supply': 70.0}, {'pressure': 70.0}),
     'positioner_loop': (
         {'loop_gain': 1.2, 'loop_low': 0.0, 'loop_high': 100.0},
-        {'gain': 1.2},
+        {'gain': 1.2, 'underdrive': 0.0, 'overdrive': 0.0},
     ),
     'tubing_dead_time': ({'tube_delay': 0.7}, {'dead_time': 0.7}),
     'air_leak': ({'leak': 0.02}, {'leak_rate': 0.02}),
@@ -109,6 +109,21 @@ OTHER_FORMS = [
             'hysteresis_width': 3.0,
         },
         {'inlet_width': 0.0, 'stem_width': 2.0, 'reach': 1.5},
+    ),
+    (
+        'hysteresis',
+        {
+            'hysteresis_kind': 2.0,
+            'hysteresis_at': 2.0,
+            'hysteresis_size': 4.0,
+            'hysteresis_width': 6.0,
+        },
+        {'inlet_width': 0.0, 'force_width': 4.0, 'reach': 1.5},
+    ),
+    (
+        'positioner_loop',
+        {'loop_gain': 1.2, 'loop_low': -5.0, 'loop_high': 130.0},
+        {'gain': 1.2, 'underdrive': 5.0, 'overdrive': 30.0},
     ),
     (
         'dwell_friction',

@@ -194,7 +194,7 @@ def climb(
                 guess = guess or rung
                 break
             if rungs:
-                both = reconsidered(fitter, group, base, [*rungs, rung])
+                both = reconsidered(fitter, group, base, [*rungs, rung], lightly=again)
                 names = [each.effect for each in both]
                 if not odds.needed(base_left, before, rung.closed, both[-1].after, names):
                     guess = guess or rung
@@ -208,7 +208,7 @@ def climb(
                     break
             rungs.append(rung)
             now, before = rung.valve, rung.after
-            candidates = [c for c in candidates if c.effect != rung.effect]
+            candidates = _others(candidates, rung.effect, lightly=again)
         progress(1.0)
         complete = True
     after = leftover(fitter.residuals(now, group.signal))
@@ -229,7 +229,15 @@ def _with(fitter: Fitter, group: Group, rung: Rung, valve: Valve) -> Rung:
     return replace(rung, valve=valve, after=after, closed=rung.before.closed_by(after))
 
 
-def reconsidered(fitter: Fitter, group: Group, base: Valve, rungs: Sequence[Rung]) -> list[Rung]:
+def _others(candidates: Sequence[Candidate], effect: str, *, lightly: bool) -> list[Candidate]:
+    """Return the candidates for another effect; in a second look those that run quickly."""
+    others = [each for each in candidates if each.effect != effect]
+    return [each for each in others if not (lightly and CATALOGUE[each.effect].laborious)]
+
+
+def reconsidered(
+    fitter: Fitter, group: Group, base: Valve, rungs: Sequence[Rung], *, lightly: bool = False
+) -> list[Rung]:
     """Return the rungs with the first name chosen anew beside the second, or one if that does.
 
     Alone, an effect may have been named because it made up for part of another one.
@@ -237,10 +245,9 @@ def reconsidered(fitter: Fitter, group: Group, base: Valve, rungs: Sequence[Rung
     first, second = rungs[0], rungs[1]
     added = second.valve.candidates[-1]
     near = sorted(first.gains, key=lambda name: -first.gains[name])[:RECONSIDERED]
+    known = group.candidates(base.effects)
     candidates = [
-        candidate
-        for candidate in group.candidates({*base.effects, second.effect})
-        if candidate.effect in near
+        each for each in _others(known, second.effect, lightly=lightly) if each.effect in near
     ]
 
     def alone(both: Valve, one: Candidate, other: Candidate) -> Valve:

@@ -46,7 +46,7 @@ not look like it are not tried."""
 DEEPENED = 3
 """So many effects are searched more deeply where none explains what is left."""
 
-Bases = Sequence[dict[str, float]]
+Bases = list[dict[str, float]]
 LAGS = ('T_g1', 'T_g2')
 
 
@@ -60,7 +60,8 @@ def race(
     """Return valves with one more effect, best first; the better, the more refitted."""
     seen: dict[str, tuple[float, ...]] = {}
     # without the effect a valve may have found its lags far off
-    bases: Bases = grid([each for each in fitter.unknowns(group) if each.name in LAGS])
+    lags: Bases = grid([each for each in fitter.unknowns(group) if each.name in LAGS])
+    frictions: Bases = [{}]
     if group.has_stem:
         results = fitter.results(valve)
         # whole slips would hide a swing
@@ -70,7 +71,7 @@ def race(
             'steps': fitter.bench.steps_of_x,
             **calibration_seen(fitter.bench, results),
         }
-        bases = friction_grid(friction_seen(fitter.bench, results)[0])
+        frictions = friction_grid(friction_seen(fitter.bench, results)[0])
     done = 0
 
     def count(runner: Valve) -> Valve:
@@ -80,7 +81,7 @@ def race(
         return runner
 
     def screened(candidate: Candidate) -> Valve:
-        return _screened(fitter, candidate, group, valve, candidate.starts(seen), bases)
+        return _screened(fitter, candidate, group, valve, candidate.starts(seen), frictions, lags)
 
     def evolved(runner: Valve, generations: int) -> Valve:
         more = fitter.evolve(runner, fitter.problem(group, runner), generations)
@@ -100,16 +101,6 @@ def race(
         best = runners[0]
         far_ahead = best.cost < FAR_AHEAD * valve.cost or excess(best) <= odds.SPOTLESS
         return len(in_reach(valve, runners[:most])) if far_ahead else most
-
-    def beside(best: Valve, runner: Valve) -> Valve:
-        """Return one that looks like the best, sought from the best's base valve as well."""
-        effect, candidate = best.candidates[-1].effect, runner.candidates[-1]
-        if effect == candidate.effect or not odds.look_alike(effect, candidate.effect):
-            return runner
-        base = {unknown.name: best.values[unknown.name] for unknown in fitter.unknowns(group)}
-        starts = [{**runner.values, **base, **own} for own in ({}, *candidate.starts(seen))]
-        there = fitter.scan(runner, starts, fitter.problem(group, runner))[0]
-        return min(runner, fitted(there), key=by_cost)
 
     with ThreadPoolExecutor(os.cpu_count()) as pool:  # compiled runs release the lock
 
@@ -151,7 +142,48 @@ def race(
         elif runners and excess(valve) < (odds.CLEAN if valve.candidates else FAINT):
             laborious = []
         runners = heat(runners, laborious)
-        return sorted(pool.map(partial(beside, runners[0]), runners), key=by_cost)
+    return alike(fitter, group, runners)
+
+
+def alike(fitter: Fitter, group: Group, runners: Sequence[Valve]) -> list[Valve]:
+    """Return the runners, those that look like the best sought from its base valve as well."""
+    best = runners[0]
+    effect = best.candidates[-1].effect
+    base = {unknown.name: best.values[unknown.name] for unknown in fitter.unknowns(group)}
+
+    def sought(runner: Valve) -> Valve:
+        candidate = runner.candidates[-1]
+        if effect == candidate.effect or not odds.look_alike(effect, candidate.effect):
+            return runner
+        own = [{**base, **start} for start in ({}, *candidate.starts({}))]
+        starts = [{**runner.values, **each} for each in (*own, *_same(best, candidate, base))]
+        there = fitter.scan(runner, starts, fitter.problem(group, runner))[0]
+        return min(runner, fitter.fit(there, fitter.problem(group, there)), key=by_cost)
+
+    return sorted(map(sought, runners), key=by_cost)
+
+
+def _same(best: Valve, candidate: Candidate, base: Mapping[str, float]) -> list[dict[str, float]]:
+    """Return what one effect is as another one with parameters of the same names.
+
+    All is linear but for friction: zero and span of the converter do to x what those of the sensor
+    do if friction and the pressures at the beginning are as much greater.
+    """
+    effect = best.candidates[-1].effect
+    names = [name for name in candidate.names if name in best.candidates[-1].names]
+    if 'f_s' not in base or not names:
+        return []
+    same = {name: best.values[f'{effect}.{name}'] for name in names}
+    zero, span = same.get('zero', 0.0), same.get('span', 1.0)
+    values = {**candidate.neutral, **{f'{candidate.effect}.{n}': v for n, v in same.items()}}
+    hidden = {name: base[name] for name in base if name.startswith(('p1_0', 'p2_0'))}
+    greater = {name: zero + span * value for name, value in hidden.items()}
+    less = {name: (value - zero) / span for name, value in hidden.items()}
+    return [
+        {**base, **values},
+        {**base, **values, **greater, 'f_s': base['f_s'] * span},
+        {**base, **values, **less, 'f_s': base['f_s'] / span},
+    ]
 
 
 def in_reach(valve: Valve, runners: Sequence[Valve]) -> list[Valve]:
@@ -188,7 +220,7 @@ def deepened(
         there = find_base(fitter, group, each, fitter.drive)
         found.append(fitter.refined(there, fitter.problem(group, there)))
         best = min(best, found[-1], key=by_cost)
-    return sorted([*found, *runners], key=by_cost)
+    return alike(fitter, group, sorted([*found, *runners], key=by_cost)) if found else runners
 
 
 def rebased(fitter: Fitter, group: Group, valve: Valve, runners: Sequence[Valve]) -> Valve:
@@ -210,7 +242,8 @@ def _screened(
     group: Group,
     valve: Valve,
     own: Sequence[dict[str, float]],
-    bases: Bases,
+    frictions: Bases,
+    lags: Bases,
 ) -> Valve:
     """Return the valve with one more effect after a short refit of its group."""
     there = replace(
@@ -224,21 +257,32 @@ def _screened(
     if len(own) > MOST_STARTS:
         costs = [fitter.scan(there, [{**usual, **start}], way)[0].cost for start in own]
         own = [own[index] for index in np.argsort(costs, kind='stable')[:FEWER_STARTS]]
-    starts = [
-        [{**usual, **base, **start} for base in (candidate.balanced(usual, start), *bases)]
-        for start in own
-    ]
 
-    def best(way: Problem, count: int) -> list[Valve]:
+    def around(bases: Bases) -> list[Bases]:
+        return [
+            [{**usual, **base, **start} for base in (candidate.balanced(usual, start), *bases)]
+            for start in own
+        ]
+
+    def best(
+        starts: Sequence[Sequence[dict[str, float]]], way: Problem, count: int
+    ) -> list[Valve]:
         each = [fitter.scan(there, some, way)[0] for some in starts]
         return sorted(each, key=by_cost)[:count]
 
-    found = best(problem, SCREENED if group.has_stem else SCREENED_IF_SMOOTH)
-    # in a second look the stem is put to rest for all
-    if CATALOGUE[candidate.effect].rugged and PUT_TO_REST.isdisjoint(fitter.drive):
+    starts = around(frictions if group.has_stem else lags)
+    found = best(starts, problem, SCREENED if group.has_stem else SCREENED_IF_SMOOTH)
+    if group.has_stem and lags != [{}]:
+        anew = [
+            [each for each in some if each[LAGS[0]] != usual[LAGS[0]]] for some in around(lags)
+        ]
+        found += [fitter.fit(each, way, SHORT) for each in best(anew, way, SCREENED)]
+    # beside another effect it takes too long, in a second look the stem is put to rest for all
+    alone = not group.unknowns_of(valve.candidates) and PUT_TO_REST.isdisjoint(fitter.drive)
+    if CATALOGUE[candidate.effect].rugged and alone:
         found += _slip_by_slip(fitter, there, [one for some in starts for one in some], problem)
     elif way != problem:
-        found += [fitter.fit(each, way, SHORT) for each in best(way, 1)]
+        found += [fitter.fit(each, way, SHORT) for each in best(starts, way, 1)]
     steps = SHORT if group.has_stem else LONG
     return min((fitter.fit(each, problem, steps) for each in found), key=by_cost)
 

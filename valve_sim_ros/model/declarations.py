@@ -113,7 +113,7 @@ class EffectParameter(Parameter):
     far from neutral it usually lies, `positive` whether it never lies below: they decide where
     data cannot. `shown` names what of the data shows where to start, if anything does: 'swings',
     the frequencies at which the residual swings most, 'steps', to whose multiples x keeps, or
-    'zeros' and 'spans' of a sensor with which the same holds the stem everywhere.
+    'zeros' and 'spans' with which the same holds the stem everywhere.
     """
 
     neutral: float = 0.0

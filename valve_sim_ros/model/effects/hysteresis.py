@@ -8,8 +8,11 @@ from numba import njit
 
 from ..declarations import Effect, EffectParameter
 from ..memory import bouc_wen, mean_of_plays
+from ..stem import Friction
 
 PLAYS = 5
+STEP, SHORTEST = 0.04, 0.1
+"""Longest step of a stem that moves against such a force [s]; least reach of it."""
 
 
 @njit
@@ -27,7 +30,31 @@ def inlet(value: float, state: Any, p: Any, memory: Any, dt: float) -> float:
 @njit
 def sensor(value: float, state: Any, p: Any, memory: Any, dt: float) -> float:
     """Return x behind its hysteresis."""
-    return behind(value, p[2], p[3], memory[2 * PLAYS :])
+    return behind(value, p[2], p[3], memory[2 * PLAYS : 3 * PLAYS])
+
+
+@njit
+def force(value: Any, state: Any, p: Any, memory: Any, dt: float) -> tuple[float, Friction]:
+    """Return the tangent at x of a force w z(x) that opposes the stem, Bouc-Wen's z."""
+    width, reach = p[4], p[4] * max(p[3], SHORTEST)
+    if width <= 0.0:
+        return value
+    offset, f = value
+    held = state.x - bouc_wen(state.x, width, reach, memory[3 * PLAYS :])
+    way = state.direction
+    if way == 0.0:
+        way = 1.0 if state.p2 + offset - held >= f.stiffness * state.x else -1.0
+    tangent = (width - max(way * held, 0.0)) / reach
+    offset -= held - tangent * state.x
+    return offset, Friction(
+        f.static_up, f.static_down, f.dynamic_up, f.dynamic_down, f.stiffness + tangent
+    )
+
+
+@njit
+def stride(value: float, state: Any, p: Any, memory: Any, dt: float) -> float:
+    """Return the longest step while the stem moves: its force follows its place."""
+    return min(value, STEP) if p[4] > 0.0 else value
 
 
 @njit
@@ -87,14 +114,34 @@ EFFECT = Effect(
             '-',
             0.0,
             0.0,
-            10.0,
+            20.0,
             'linear',
-            '0: plays; else Bouc-Wen, which falls behind over 1 or more times the width',
+            '0: plays; else Bouc-Wen, which falls behind over 1 or more times the width (a force '
+            'over any share of it)',
             starts=(1.2, 2.5),
         ),
+        EffectParameter(
+            'force_width',
+            'w_f',
+            '%',
+            0.0,
+            0.0,
+            30.0,
+            'linear',
+            'Half-width of the loop of the force with which spring or diaphragm oppose the stem',
+            stage='p2-x',
+            starts=(1.5, 5.0),
+            usual=(0.6, 15.0),
+        ),
     ),
-    slots={'command_slot': command, 'inlet_slot': inlet, 'sensor_slot': sensor},
-    memory=3 * PLAYS,
+    slots={
+        'command_slot': command,
+        'inlet_slot': inlet,
+        'force_slot': force,
+        'stride_slot': stride,
+        'sensor_slot': sensor,
+    },
+    memory=3 * PLAYS + 2,
     order=20,
     variants=(
         ('inlet_width',),
@@ -103,6 +150,7 @@ EFFECT = Effect(
         ('command_width', 'reach'),
         ('stem_width',),
         ('stem_width', 'reach'),
+        ('force_width', 'reach'),
     ),
     explanation='Many small plays, as in a worn linkage or a flapper, instead of a single one.',
     symptom='Rounded loops, with minor loops inside them, after each reversal.',

@@ -38,6 +38,7 @@ EFFECT = Effect(
             'p1 where it should be 0',
             starts=(-2.0, 0.0, 2.0),
             usual=(0.4, 5.5),
+            shown='zeros',
         ),
         EffectParameter(
             'span',
@@ -51,6 +52,7 @@ EFFECT = Effect(
             neutral=1.0,
             starts=(0.93, 1.0, 1.07),
             usual=(0.008, 0.13),
+            shown='spans',
         ),
         EffectParameter(
             'upstream',

@@ -13,12 +13,12 @@ from ..declarations import Effect, EffectParameter
 @njit
 def command(value: float, state: Any, p: Any, memory: Any, dt: float) -> float:
     """Return the output of a PI controller of the stem position, u + K (u - x) + I."""
-    gain, integral_gain, overdrive, initial = p
+    gain, integral_gain, overdrive, initial, underdrive = p
     if math.isnan(memory[0]):
         memory[0] = initial
     error = value - (state.x + dt * state.v)  # at the end of the step
     raised = value + gain * error + memory[0]
-    low, high = -overdrive, 100.0 + overdrive
+    low, high = -underdrive, 100.0 + overdrive
     if low < raised < high or (raised <= low) == (error > 0.0):  # no wind-up
         memory[0] += integral_gain * dt * error
     return min(max(raised, low), high)
@@ -60,7 +60,7 @@ EFFECT = Effect(
             0.0,
             1000.0,
             'linear',
-            'How far beyond the span of u it can drive the converter',
+            'How far above the span of u it can drive the converter',
             neutral=1000.0,
             starts=(0.0,),
         ),
@@ -76,6 +76,18 @@ EFFECT = Effect(
             starts=(0.0,),
             step=0.5,
         ),
+        EffectParameter(
+            'underdrive',
+            'o_0',
+            '%',
+            0.0,
+            0.0,
+            1000.0,
+            'linear',
+            'How far below the span of u it can drive the converter',
+            neutral=1000.0,
+            starts=(0.0,),
+        ),
     ),
     slots={'command_slot': command},
     memory=1,
@@ -84,7 +96,7 @@ EFFECT = Effect(
     variants=(
         ('gain',),
         ('gain', 'integral_gain', 'initial_integral'),
-        ('gain', 'integral_gain', 'initial_integral', 'overdrive'),
+        ('gain', 'integral_gain', 'initial_integral', 'overdrive', 'underdrive'),
     ),
     explanation='A positioner compares the stem with the command and drives the converter harder.',
     symptom='p1 moves while u rests, and overshoots after each step until the stem has followed.',
