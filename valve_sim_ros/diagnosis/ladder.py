@@ -271,8 +271,12 @@ def reconsidered(
     later = alone(second.valve, added, first.valve.candidates[-1])
     if only := enough(second, later):
         return only
+    runners = race(fitter, group, later, candidates)
+    later = rebased(fitter, group, later, runners[:5])
+    if only := enough(second, later):
+        return only
     before = leftover(fitter.residuals(later, group.signal))
-    found = judged(fitter, group, later, before, race(fitter, group, later, candidates))
+    found = judged(fitter, group, later, before, runners)
     if found is None:
         return list(rungs)
     worse = 0.5 * (found.valve.cost - second.valve.cost) / found.after.inflation

@@ -1,0 +1,62 @@
+# Copyright 2026 The valve_sim_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""With x alone, all stages are sought at once: lags found without an effect are far off."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from valve_sim_ros import simulate
+from valve_sim_ros.diagnosis.base_valve import find_base, starting_valve
+from valve_sim_ros.diagnosis.bench import Bench
+from valve_sim_ros.diagnosis.fitting import Fitter
+from valve_sim_ros.diagnosis.race import alike, race
+from valve_sim_ros.diagnosis.stages import groups
+from valve_sim_ros.recordings.recording import Recording
+
+(ALL,) = groups(('x',))
+VALVE = {'f_d1': 0.5, 'T_g1': 2.8, 'T_g2': 10.0, 'f_s': 10.0, 'f_d': 4.5}
+
+
+def measured(samples=50, **effects):
+    """Return a fitter beside x alone, noise 0.2 %, of a valve with effects."""
+    levels = np.random.default_rng(8).uniform(10.0, 90.0, 24)
+    u = np.concatenate([np.full(20, 40.0), np.repeat(levels, samples)])
+    used = list({name.split('.')[0] for name in effects})
+    s = simulate(u, parameters={**VALVE, 'effects': used, **effects})
+    x = s.x + 0.2 * np.random.default_rng(2).standard_normal(u.size)
+    return Fitter(Bench([Recording(s.t, u, x=x)]))
+
+
+def candidates(*effects):
+    return [each for each in ALL.candidates() if each.effect in effects]
+
+
+def test_a_rate_that_is_limited_one_way_is_found():
+    fitter = measured(**{'rate_limit.emptying_rate': 1.2, 'rate_limit.pressure_rate': 1000.0})
+    base = find_base(fitter, ALL, starting_valve(fitter.bench), ())
+    best, *_ = race(fitter, ALL, base, candidates('rate_limit', 'quick_exhaust'))
+    assert best.candidates[-1].names == ('emptying_rate',)
+    assert best.values['rate_limit.emptying_rate'] == pytest.approx(1.2, rel=0.05)
+
+
+def test_the_span_of_a_converter_is_found_where_that_of_a_sensor_is():
+    """All is linear but for friction: only its size differs, and no x shows that."""
+    fitter = measured(**{'sensor_calibration.zero': 1.0, 'sensor_calibration.span': 0.85})
+    one, other = (c for c in candidates('ip_calibration', 'sensor_calibration'))
+    if one.effect == 'sensor_calibration':
+        one, other = other, one
+    true = {**starting_valve(fitter.bench).values, **VALVE, 'f_d/f_s': 0.45}
+    true |= {f'sensor_calibration.{name}': v for name, v in (('zero', 1.0), ('span', 0.85))}
+    start = replace(starting_valve(fitter.bench), values={**true, **one.neutral})
+
+    def runner(candidate):
+        there = replace(start, effects=(candidate.effect,), candidates=(candidate,))
+        return fitter.fit(there, fitter.problem(ALL, there))
+
+    sensor = runner(other)
+    stuck = replace(start, effects=(one.effect,), candidates=(one,), cost=1e9)
+    found = next(each for each in alike(fitter, ALL, [sensor, stuck]) if each is not sensor)
+    assert found.cost == pytest.approx(sensor.cost, rel=0.05)
+    assert found.values['ip_calibration.span'] == pytest.approx(0.85, abs=0.02)
