@@ -77,11 +77,12 @@ def score(folder: Path, verdicts: Path | None, records: bool) -> None:
 @main.command('study')
 @click.option('--split', type=click.Choice(sets.SPLITS), default='test', show_default=True)
 @click.option('--share', type=click.FloatRange(0.0, 1.0), default=1.0, show_default=True)
+@click.option('--seed', type=click.IntRange(0), default=0, show_default=True)
 @click.option('--out', type=FOLDER, default=Path('build/blind'), show_default=True)
 @click.option('--doc', type=FOLDER, help='Markdown file for the table.')
-def whole_study(split: str, share: float, out: Path, doc: Path | None) -> None:
+def whole_study(split: str, share: float, seed: int, out: Path, doc: Path | None) -> None:
     """Generate, diagnose and score all sets; SHARE of their records."""
-    found = study.study(split, share, out, bar)
+    found = study.study(split, share, seed, out, bar)
     for each in found:
         click.echo(as_text(each) + '\n')
     if doc:

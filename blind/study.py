@@ -48,7 +48,7 @@ def scored(folder: Path, verdicts: Path) -> Scored:
     return Scored(about['set'], ','.join(about['signals']), read_all(folder, verdicts))
 
 
-def study(split: str, share: float, out: Path, progress: Progress) -> list[Scored]:
+def study(split: str, share: float, seed: int, out: Path, progress: Progress) -> list[Scored]:
     """Generate and diagnose all sets, then open their keys.
 
     Parameters
@@ -57,6 +57,8 @@ def study(split: str, share: float, out: Path, progress: Progress) -> list[Score
         Which half.
     share : float
         Share of each set's records.
+    seed : int
+        Seed of all sets.
     out : Path
         Where sets and verdicts go; what is there already is used.
     progress : callable
@@ -68,7 +70,7 @@ def study(split: str, share: float, out: Path, progress: Progress) -> list[Score
         wanted = max(round(share * count), 1)
         if not (folder / 'set.json').exists():
             bar = progress(f'{folder.name}: records', wanted)
-            sets.generate(name, split, tuple(signals.split(',')), wanted, 0, folder, bar)
+            sets.generate(name, split, tuple(signals.split(',')), wanted, seed, folder, bar)
         folders.append(folder)
     for folder in folders:
         bar = progress(f'{folder.name}: verdicts', read_json(folder / 'set.json')['count'])

@@ -264,22 +264,18 @@ def _screened(
             for start in own
         ]
 
-    def best(
-        starts: Sequence[Sequence[dict[str, float]]], way: Problem, count: int
-    ) -> list[Valve]:
+    def best(starts: Sequence[Bases], way: Problem, count: int) -> list[Valve]:
         each = [fitter.scan(there, some, way)[0] for some in starts]
         return sorted(each, key=by_cost)[:count]
 
     starts = around(frictions if group.has_stem else lags)
     found = best(starts, problem, SCREENED if group.has_stem else SCREENED_IF_SMOOTH)
-    if group.has_stem and lags != [{}]:
-        anew = [
-            [each for each in some if each[LAGS[0]] != usual[LAGS[0]]] for some in around(lags)
-        ]
-        found += [fitter.fit(each, way, SHORT) for each in best(anew, way, SCREENED)]
-    # beside another effect it takes too long, in a second look the stem is put to rest for all
-    alone = not group.unknowns_of(valve.candidates) and PUT_TO_REST.isdisjoint(fitter.drive)
-    if CATALOGUE[candidate.effect].rugged and alone:
+    first = not group.unknowns_of(valve.candidates)  # beside another effect it takes too long
+    if group.has_stem and lags != [{}] and first:
+        anew = [some[1:] for some in around(lags)]
+        found += [fitter.fit(each, way, SHORT) for each in best(anew, way, 1)]
+    # in a second look the stem is put to rest for all
+    if CATALOGUE[candidate.effect].rugged and first and PUT_TO_REST.isdisjoint(fitter.drive):
         found += _slip_by_slip(fitter, there, [one for some in starts for one in some], problem)
     elif way != problem:
         found += [fitter.fit(each, way, SHORT) for each in best(starts, way, 1)]
