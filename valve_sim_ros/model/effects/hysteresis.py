@@ -18,25 +18,25 @@ STEP, SHORTEST = 0.04, 0.1
 @njit
 def command(value: float, state: Any, p: Any, memory: Any, dt: float) -> float:
     """Return the command behind its hysteresis."""
-    return behind(value, p[0], p[3], memory[:PLAYS])
+    return behind(value, p[0], p[4], memory[:PLAYS])
 
 
 @njit
 def inlet(value: float, state: Any, p: Any, memory: Any, dt: float) -> float:
     """Return p1 behind its hysteresis."""
-    return behind(value, p[1], p[3], memory[PLAYS : 2 * PLAYS])
+    return behind(value, p[1], p[4], memory[PLAYS : 2 * PLAYS])
 
 
 @njit
 def sensor(value: float, state: Any, p: Any, memory: Any, dt: float) -> float:
     """Return x behind its hysteresis."""
-    return behind(value, p[2], p[3], memory[2 * PLAYS : 3 * PLAYS])
+    return behind(value, p[2], p[4], memory[2 * PLAYS : 3 * PLAYS])
 
 
 @njit
 def force(value: Any, state: Any, p: Any, memory: Any, dt: float) -> tuple[float, Friction]:
     """Return the tangent at x of a force w z(x) that opposes the stem, Bouc-Wen's z."""
-    width, reach = p[4], p[4] * max(p[3], SHORTEST)
+    width, reach = p[3], p[3] * max(p[4], SHORTEST)
     if width <= 0.0:
         return value
     offset, f = value
@@ -54,7 +54,7 @@ def force(value: Any, state: Any, p: Any, memory: Any, dt: float) -> tuple[float
 @njit
 def stride(value: float, state: Any, p: Any, memory: Any, dt: float) -> float:
     """Return the longest step while the stem moves: its force follows its place."""
-    return min(value, STEP) if p[4] > 0.0 else value
+    return min(value, STEP) if p[3] > 0.0 else value
 
 
 @njit
@@ -109,18 +109,6 @@ EFFECT = Effect(
             usual=(0.6, 15.0),
         ),
         EffectParameter(
-            'reach',
-            'r',
-            '-',
-            0.0,
-            0.0,
-            20.0,
-            'linear',
-            '0: plays; else Bouc-Wen, which falls behind over 1 or more times the width (a force '
-            'over any share of it)',
-            starts=(1.2, 2.5),
-        ),
-        EffectParameter(
             'force_width',
             'w_f',
             '%',
@@ -132,6 +120,18 @@ EFFECT = Effect(
             stage='p2-x',
             starts=(1.5, 5.0),
             usual=(0.6, 15.0),
+        ),
+        EffectParameter(
+            'reach',
+            'r',
+            '-',
+            0.0,
+            0.0,
+            20.0,
+            'linear',
+            '0: plays; else Bouc-Wen, which falls behind over 1 or more times the width (a force '
+            'over any share of it)',
+            starts=(1.2, 2.5),
         ),
     ),
     slots={

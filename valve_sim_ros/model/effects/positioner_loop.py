@@ -13,7 +13,7 @@ from ..declarations import Effect, EffectParameter
 @njit
 def command(value: float, state: Any, p: Any, memory: Any, dt: float) -> float:
     """Return the output of a PI controller of the stem position, u + K (u - x) + I."""
-    gain, integral_gain, overdrive, initial, underdrive = p
+    gain, integral_gain, overdrive, underdrive, initial = p
     if math.isnan(memory[0]):
         memory[0] = initial
     error = value - (state.x + dt * state.v)  # at the end of the step
@@ -65,18 +65,6 @@ EFFECT = Effect(
             starts=(0.0,),
         ),
         EffectParameter(
-            'initial_integral',
-            'I_0',
-            '%',
-            0.0,
-            -100.0,
-            100.0,
-            'linear',
-            'Integral part at the first sample',
-            starts=(0.0,),
-            step=0.5,
-        ),
-        EffectParameter(
             'underdrive',
             'o_0',
             '%',
@@ -87,6 +75,18 @@ EFFECT = Effect(
             'How far below the span of u it can drive the converter',
             neutral=1000.0,
             starts=(0.0,),
+        ),
+        EffectParameter(
+            'initial_integral',
+            'I_0',
+            '%',
+            0.0,
+            -100.0,
+            100.0,
+            'linear',
+            'Integral part at the first sample',
+            starts=(0.0,),
+            step=0.5,
         ),
     ),
     slots={'command_slot': command},
