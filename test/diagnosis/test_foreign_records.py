@@ -97,3 +97,12 @@ def test_a_name_that_closes_little_on_both_parts_is_withdrawn(fitted, held_out, 
     group = groups(('p1', 'p2', 'x'))[2]
     ladder = Ladder(group, 'missing_effect', None, None, None, None)
     assert _closes_nothing({'x': gap}, ladder) == empty
+
+
+def test_a_lag_of_the_sensor_is_not_taken_for_a_stem_slower_than_any():
+    rng = np.random.default_rng(9)
+    valve = {'f_d1': 0.5, 'T_g1': 2.9, 'T_g2': 4.2, 'f_s': 3.4, 'f_d': 2.7}
+    lag = {'effects': ['sensor_lag'], 'sensor_lag.time_constant': 1.0}
+    run = simulate(staircase(rng, 60, 28), 0.5, {**valve, **lag})
+    noisy = [each + 0.3 * rng.standard_normal(run.t.size) for each in (run.p2, run.x)]
+    assert named(Recording(run.t, run.u, p2=noisy[0], x=noisy[1])) == ['sensor_lag']
