@@ -44,8 +44,8 @@ EFFECT = Effect(
     longest_step=0.1,
     order=10,
     imitated=True,
-    explanation='The position transmitter filters its signal, or the stem is damped so much that it '
-    'lags by half a second or more.',
+    explanation='The position transmitter filters its signal, or the stem is damped so much '
+    'that it lags by half a second or more.',
     symptom='Measured slips are rounded.',
     confirm='Move the sensor by hand, or read its damping setting.',
     twins={'ip_lag': 'with x alone slow converters and slow sensors differ only at slips'},
