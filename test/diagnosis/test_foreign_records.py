@@ -2,13 +2,16 @@
 # SPDX-License-Identifier: Apache-2.0
 """What records of simulators by other authors showed."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from valve_sim_ros import simulate
 from valve_sim_ros.diagnosis import diagnose
+from valve_sim_ros.diagnosis.adequacy import Leftover
 from valve_sim_ros.diagnosis.diagnose import _closes_nothing
-from valve_sim_ros.diagnosis.ladder import Ladder
+from valve_sim_ros.diagnosis.ladder import concluded, Ladder, Rung
 from valve_sim_ros.diagnosis.proof import Gap, Halves
 from valve_sim_ros.diagnosis.stages import groups
 from valve_sim_ros.recordings.recording import Recording
@@ -95,8 +98,12 @@ def test_a_name_that_closes_little_on_both_parts_is_withdrawn(fitted, held_out, 
     left, before = Halves(fitted, held_out), Halves(1.0, 1.0)
     gap = Gap(0.2, before, left, before, before)
     group = groups(('p1', 'p2', 'x'))[2]
-    ladder = Ladder(group, 'missing_effect', None, None, None, None)
+    noise = Leftover(1.2, 1.2, 1.0, 5000, 1.0)
+    ladder = Ladder(group, 'missing_effect', None, None, noise, noise)
     assert _closes_nothing({'x': gap}, ladder) == empty
+    assert concluded(ladder).outcome == 'adequate'
+    coarse = Rung('sensor_quantisation', 'sensor', {}, noise, noise, 0.0, 0.9, (), None)
+    assert not _closes_nothing({'x': gap}, replace(ladder, rungs=(coarse,)))
 
 
 def test_a_lag_of_the_sensor_is_not_taken_for_a_stem_slower_than_any():

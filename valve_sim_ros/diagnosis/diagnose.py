@@ -22,6 +22,7 @@ from .errors import DiagnosisError
 from .fitting import Fitter, Valve
 from .intervals import intervals
 from .ladder import concluded, Ladder
+from .odds import COARSE
 from .proof import closed, Gap, prove
 from .result import Diagnosis, Named
 from .stages import groups
@@ -225,8 +226,11 @@ def _named(
 def _closes_nothing(gaps: Mapping[str, Gap], ladder: Ladder) -> bool:
     """Tell whether a name closes next to nothing of its signal, neither where fitted nor beyond.
 
-    One slip at another moment may spoil the part held out.
+    One slip at another moment may spoil the part held out. A coarse sensor is told by the values
+    of x: it need not close anything.
     """
+    if COARSE in {rung.effect for rung in ladder.rungs}:
+        return False
     gap = gaps[ladder.group.signal]
     fitted = closed(gap.before.fitted, gap.after.fitted, gap.noise)
     known = [each for each in (fitted, gap.closed) if each is not None]

@@ -343,10 +343,9 @@ def concluded(ladder: Ladder) -> Ladder:
     if names and odds.explained(signal, ladder.before, ladder.after, names):
         return replace(ladder, outcome='missing_effect')
     # what does not explain the gap is not left in the valve either
-    plain = replace(ladder, valve=ladder.base, after=ladder.before, rungs=())
-    if ladder.before.excess > odds.ADEQUATE[signal]:
-        return replace(plain, outcome='unknown_effect')
-    return plain
+    unknown = ladder.before.excess > odds.ADEQUATE[signal]
+    outcome: Outcome = 'unknown_effect' if unknown else 'adequate'
+    return replace(ladder, outcome=outcome, valve=ladder.base, after=ladder.before, rungs=())
 
 
 def excused(ladder: Ladder, plain: Leftover) -> Ladder:
