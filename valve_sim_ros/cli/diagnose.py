@@ -30,7 +30,7 @@ from .options import INTERRUPTED, progress_bar, topic_option, topics_by_signal
 @click.option(
     '--patience',
     type=click.FloatRange(0.0),
-    default=180.0,  # PATIENCE of the diagnosis, which takes seconds to import
+    default=300.0,  # PATIENCE of the diagnosis, which takes seconds to import
     show_default=True,
     help='Seconds after which no further search begins; what was found so far is the result.',
 )

@@ -186,7 +186,7 @@ def _refuse_useless(bench: Bench) -> None:
 
 
 LEAST_SAMPLES, MOST_SAMPLES = 200, 20_000
-PATIENCE = 180.0
+PATIENCE = 300.0
 """How long a user waits for the last searches: an x that nothing explains takes minutes [s]."""
 LEAST_HELD = 0.3
 """A name that closes less of the gap, on fitted data and on those held out, is withdrawn."""
