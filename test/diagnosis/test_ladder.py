@@ -22,13 +22,12 @@ from valve_sim_ros.diagnosis.ladder import (
     climb,
     concluded,
     excused,
-    judged,
     Ladder,
     reconsidered,
-    Rung,
 )
 from valve_sim_ros.diagnosis.odds import explained, strong, suspicious
 from valve_sim_ros.diagnosis.race import race
+from valve_sim_ros.diagnosis.rung import judged, Rung
 from valve_sim_ros.diagnosis.stages import groups
 from valve_sim_ros.recordings.recording import Recording
 

@@ -44,9 +44,7 @@ def test_a_rate_that_is_limited_one_way_is_found():
 def test_the_span_of_a_converter_is_found_where_that_of_a_sensor_is():
     """All is linear but for friction: only its size differs, and no x shows that."""
     fitter = measured(**{'sensor_calibration.zero': 1.0, 'sensor_calibration.span': 0.85})
-    one, other = (c for c in candidates('ip_calibration', 'sensor_calibration'))
-    if one.effect == 'sensor_calibration':
-        one, other = other, one
+    (one,), (other,) = candidates('ip_calibration'), candidates('sensor_calibration')
     true = {**starting_valve(fitter.bench).values, **VALVE, 'f_d/f_s': 0.45}
     true |= {f'sensor_calibration.{name}': v for name, v in (('zero', 1.0), ('span', 0.85))}
     start = replace(starting_valve(fitter.bench), values={**true, **one.neutral})

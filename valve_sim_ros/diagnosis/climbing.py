@@ -13,7 +13,8 @@ from .adequacy import leftover
 from .base_valve import find_base
 from .coarse import rounded
 from .fitting import Fitter, GENERATIONS, NARROW, Valve
-from .ladder import climb, concluded, excused, Ladder, Rung
+from .ladder import climb, concluded, excused, Ladder
+from .rung import Rung
 from .stages import Group
 from .stretch import CAUGHT, HELD, RESTS
 from .unknowns import PHASE

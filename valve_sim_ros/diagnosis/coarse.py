@@ -13,9 +13,10 @@ import math
 from . import odds
 from .adequacy import leftover
 from .fitting import Fitter
-from .ladder import concluded, Ladder, Rung
+from .ladder import concluded, Ladder
 from .odds import COARSE
 from .readings import OFF
+from .rung import Rung
 from .stages import Candidate
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from ..model.effects import CATALOGUE
 from ..model.pipeline import Array
 from ..recordings.recording import Recording
-from .ladder import Rung
+from .rung import Rung
 
 STROKES = (0.0, 100.0, 0.0, 50.0)
 """To both stops: a sensor's error moves them, a spring's does not."""

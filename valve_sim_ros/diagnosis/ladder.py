@@ -15,6 +15,7 @@ from .base_valve import find_base, on_other_side
 from .fitting import by_cost, Fitter, Valve
 from .loosening import loosened
 from .race import deepened, race, rebased
+from .rung import judged, Rung
 from .stages import Candidate, Group
 from .stretch import PUT_TO_REST
 
@@ -25,45 +26,6 @@ RECONSIDERED = 5
 """So many rivals of the first effect are tried again beside the second."""
 
 Outcome = Literal['adequate', 'missing_effect', 'unknown_effect']
-
-
-@dataclass(frozen=True)
-class Rung:
-    """One step of the ladder.
-
-    Attributes
-    ----------
-    effect, stage : str
-        What was added, and where it acts.
-    gains : mapping of str to float
-        Evidence for each effect that was tried: half log-likelihood of independent samples.
-    before, after : Leftover
-        What the valve left of the group's signal before and after.
-    closed : float
-        Part of the excess over the noise that it removed.
-    probability : float
-        See `odds.probability`.
-    twins : tuple of str
-        Effects that these data do not tell from it.
-    valve : Valve
-        With it.
-    """
-
-    effect: str
-    stage: str
-    gains: dict[str, float]
-    before: Leftover
-    after: Leftover
-    closed: float
-    probability: float
-    twins: tuple[str, ...]
-    valve: Valve
-
-    @property
-    def runner_up(self) -> str | None:
-        """The effect that comes next."""
-        others = {n: g for n, g in self.gains.items() if n != self.effect and g > 0.0}
-        return max(others, key=lambda name: others[name]) if others else None
 
 
 @dataclass(frozen=True)
@@ -208,7 +170,8 @@ def climb(
                     break
             rungs.append(rung)
             now, before = rung.valve, rung.after
-            candidates = _others(candidates, rung.effect, lightly=again)
+            others = [each for each in candidates if each.effect != rung.effect]
+            candidates = [each for each in others if not (again and _laborious(each.effect))]
         progress(1.0)
         complete = True
     after = leftover(fitter.residuals(now, group.signal))
@@ -229,10 +192,9 @@ def _with(fitter: Fitter, group: Group, rung: Rung, valve: Valve) -> Rung:
     return replace(rung, valve=valve, after=after, closed=rung.before.closed_by(after))
 
 
-def _others(candidates: Sequence[Candidate], effect: str, *, lightly: bool) -> list[Candidate]:
-    """Return the candidates for another effect; in a second look those that run quickly."""
-    others = [each for each in candidates if each.effect != effect]
-    return [each for each in others if not (lightly and CATALOGUE[each.effect].laborious)]
+def _laborious(effect: str) -> bool:
+    """Tell whether runs with an effect take many times as long."""
+    return CATALOGUE[effect].laborious
 
 
 def reconsidered(
@@ -240,15 +202,15 @@ def reconsidered(
 ) -> list[Rung]:
     """Return the rungs with the first name chosen anew beside the second, or one if that does.
 
-    Alone, an effect may have been named because it made up for part of another one.
+    Alone, an effect may have been named because it made up for part of another one. `lightly`
+    leaves out laborious effects but the first.
     """
     first, second = rungs[0], rungs[1]
     added = second.valve.candidates[-1]
     near = sorted(first.gains, key=lambda name: -first.gains[name])[:RECONSIDERED]
-    known = group.candidates(base.effects)
-    candidates = [
-        each for each in _others(known, second.effect, lightly=lightly) if each.effect in near
-    ]
+    names = {first.effect, *(name for name in near if not (lightly and _laborious(name)))}
+    others = group.candidates({*base.effects, second.effect})
+    candidates = [each for each in others if each.effect in names]
 
     def alone(both: Valve, one: Candidate, other: Candidate) -> Valve:
         """Return the valve with only one of two effects."""
@@ -292,48 +254,6 @@ def reconsidered(
 def _within(progress: Callable[[float], object], step: int) -> Callable[[float], object]:
     """Return how to tell the progress of one step of the ladder."""
     return lambda share: progress((step + share) / MOST_EFFECTS)
-
-
-def judged(
-    fitter: Fitter, group: Group, now: Valve, before: Leftover, runners: Sequence[Valve]
-) -> Rung | None:
-    """Return the step to the best runner if the evidence is enough."""
-    runners = [runner for runner in runners if odds.size(runner) > odds.NEGLIGIBLE]
-    if not runners:
-        return None
-    best_after = leftover(fitter.residuals(runners[0], group.signal))
-    inflation, count = best_after.inflation, best_after.samples
-    tops = odds.best_per_effect(runners)
-    gains = {
-        each.candidates[-1].effect: odds.gain(now.cost, each, inflation, count) for each in tops
-    }
-    best = odds.choice(tops, gains)
-    candidate = best.candidates[-1]
-    after = leftover(fitter.residuals(best, group.signal))
-    change = before.mean_square - after.mean_square
-    least = odds.LEAST_SHIFT if candidate.effect in odds.LASTING else odds.LEAST_CHANGE
-    little = before.excess < odds.LEAST_EXCESS[group.signal]
-    enough = odds.MORE_ENOUGH if little else odds.ENOUGH
-    # where a few far errors were the only reason to look, they must be gone
-    only_far = little and min(before.far, after.far) >= odds.LEAST_FAR
-    # what has the colour of noise is misfit only where an effect takes it away
-    still_coloured = (
-        odds.coloured(group, before) and after.inflation > odds.WHITER * before.inflation
-    )
-    if gains[candidate.effect] < enough or change < least or only_far or still_coloured:
-        return None
-    closed = before.closed_by(after)
-    return Rung(
-        candidate.effect,
-        candidate.stage,
-        gains,
-        before,
-        after,
-        closed,
-        odds.probability(gains, candidate.effect, closed),
-        tuple(odds.close_rivals(gains, candidate.effect)),
-        best,
-    )
 
 
 def concluded(ladder: Ladder) -> Ladder:

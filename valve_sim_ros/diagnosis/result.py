@@ -20,8 +20,9 @@ from .bench import Bench
 from .conditions import Place
 from .decision import decisions, TestSignal
 from .fitting import Valve
-from .ladder import Ladder, Outcome, Rung
+from .ladder import Ladder, Outcome
 from .proof import Gap
+from .rung import Rung
 
 SCHEMA_VERSION = 1
 WORDS = {

@@ -6,8 +6,8 @@ from matplotlib.figure import Figure
 import numpy as np
 
 from ..diagnosis.adequacy import WINDOW
-from ..diagnosis.ladder import Rung
 from ..diagnosis.result import Diagnosis
+from ..diagnosis.rung import Rung
 from ..diagnosis.unknowns import complete
 from ..model.pipeline import Array
 from ..recordings.recording import OUTPUTS
