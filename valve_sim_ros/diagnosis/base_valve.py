@@ -6,19 +6,20 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from . import odds
-from .adequacy import leftover
+from .adequacy import Leftover, leftover
 from .arrivals import put_in_its_period
 from .bench import Bench, MIXED_JITTER
-from .fitting import by_cost, eased, Fitter, NARROW, Problem, SHORT, Valve
+from .fitting import by_cost, eased, FINE, Fitter, NARROW, Problem, SHORT, Valve
 from .seen import friction_seen, mixed_arrivals
 from .stages import Group
-from .starts import friction_grid, grid, START, STEMS
+from .starts import friction_grid, grid, START, STEMS, SWEEP
 from .unknowns import EARLY, LATE, PHASE, Unknown
 
 FEW_STARTS = 3
 """So many starts are followed."""
-FOLLOWED, GENERATIONS = 4, 30
-"""So many base valves are followed by an evolution where costs are rugged, and for how long."""
+SWEPT, FOLLOWED, GENERATIONS = 4, 4, 30
+"""So many base valves are tried with stems of all kinds; so many are followed by an evolution
+where costs are rugged, and for how long."""
 NEARLY = 0.95
 """Phase beyond which a command acts nearly a whole period late or early."""
 LAG, CLEARLY = 'ip_lag', 50.0
@@ -84,6 +85,11 @@ def find_base(
     found = followed(problem)
     if roughly:
         return found[0]
+    if group.has_stem:
+        swept = [with_any_stem(fitter, each, problem) for each in found[:SWEPT]]
+        found = sorted(
+            [*found, *(fitter.fit(each, problem, SHORT) for each in swept)], key=by_cost
+        )
     if not group.has_stem:
         best = fitter.refined(found[0], problem)
         return put_in_its_period(fitter, group, best, problem)
@@ -99,6 +105,24 @@ def find_base(
     found = sorted(found, key=by_cost)[:FOLLOWED]
     found += [fitter.evolve(each, problem, GENERATIONS, NARROW) for each in found]
     return fitter.refined(min(found, key=by_cost), problem)
+
+
+def on_time(fitter: Fitter, group: Group, valve: Valve) -> Leftover:
+    """Return what a base valve leaves of x if its stem is caught where it is far off.
+
+    A slip that only just comes, or does not, hangs on less than noise leaves open; all after it is
+    then off for as long as the stem rests. Caught, it is off until it is seen to rest.
+    """
+    *ways, _ = eased(fitter.problem(group, valve))
+    for way, spread in zip(ways, (NARROW, FINE), strict=True):
+        valve = fitter.fit(fitter.evolve(valve, way, GENERATIONS, spread), way)
+    return leftover(fitter.residuals(valve, group.signal, way[2]))
+
+
+def with_any_stem(fitter: Fitter, valve: Valve, problem: Problem) -> Valve:
+    """Return a valve with the stem, of those of all kinds, that fits best."""
+    stems = [dict(valve.values), *({**valve.values, **stem} for stem in SWEEP)]
+    return fitter.scan(valve, stems, problem)[0]
 
 
 def on_other_side(fitter: Fitter, group: Group, valve: Valve) -> Valve:

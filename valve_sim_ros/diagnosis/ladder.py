@@ -11,7 +11,7 @@ from ..model.effects import CATALOGUE
 from . import odds
 from .adequacy import Leftover, leftover
 from .arrivals import put_in_its_period
-from .base_valve import find_base, on_other_side
+from .base_valve import find_base, on_other_side, on_time
 from .fitting import by_cost, Fitter, Valve
 from .loosening import loosened
 from .race import deepened, race, rebased
@@ -87,6 +87,7 @@ def climb(
     """
     rungs: list[Rung] = []
     guess = None
+    chance: Leftover | None = None  # left where the gap is but slips that hang on noise
     complete = False
     again = not PUT_TO_REST.isdisjoint(fitter.drive)
 
@@ -104,6 +105,8 @@ def climb(
         return odds.suspicious(left, group, fitter.bench.mixed)
 
     def sought(left: Leftover) -> Sequence[Candidate]:
+        if left is chance:
+            return ()
         if worth(left):
             return candidates
         hidden = group.stages == ('p2-x',) and not (rungs or named or carried > odds.SPOTLESS)
@@ -126,6 +129,10 @@ def climb(
                 if not worth(left):
                     now, before = loose, left
             base, base_left = now, before
+        if group.has_stem and not again and worth(before):
+            caught = on_time(fitter, group, now)
+            if caught.excess <= odds.SPOTLESS and caught.far < odds.MORE_FAR:
+                before = base_left = chance = caught
         for step in range(MOST_EFFECTS):
             some = sought(before)
             if not some:

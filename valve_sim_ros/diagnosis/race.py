@@ -16,9 +16,18 @@ from ..model.effects import CATALOGUE
 from ..model.pipeline import Array
 from . import odds
 from .adequacy import leftover
-from .base_valve import find_base
-from .fitting import by_cost, eased, FAINT, Fitter, LONG, Problem, SHORT, Valve
-from .seen import calibration_seen, friction_seen
+from .base_valve import find_base, with_any_stem
+from .fitting import (
+    by_cost,
+    eased,
+    FAINT,
+    Fitter,
+    LONG,
+    Problem,
+    SHORT,
+    Valve,
+)
+from .seen import calibration_seen, DWELL, dwell_seen, friction_seen
 from .stages import Candidate, Group
 from .starts import friction_grid, grid, STEMS
 from .stretch import PUT_TO_REST, RESTS
@@ -31,9 +40,10 @@ so many of the best."""
 SCREENED, SCREENED_IF_SMOOTH, FINISHERS, REFINED = 3, 8, 5, 2
 """How many starts of a candidate are followed (more without a stem: such fits are quick), runners
 refitted, and refined to the end."""
-DESCENT, FOLLOWED, TURNS, FINEST = 12, 3, 25, 0.3
-"""Steps of a descent to single slips; so many of its ends are taken on to all slips, by evolutions
-of so many generations that begin with so little spread [steps of unknowns]."""
+BEGUN, DESCENT, FOLLOWED, TURNS, FINEST = 8, 12, 3, 25, 0.3
+"""So many starts are led to single slips; steps of that descent; so many of its ends are taken on
+to all slips, by evolutions of so many generations that begin with so little spread [steps of
+unknowns]."""
 FAR_OFF = 1.0
 """Excess of a caught stem beyond which it is not worth while to let it go."""
 FAR_AHEAD, BEHIND = 0.2, 0.5
@@ -62,6 +72,8 @@ def race(
     # without the effect a valve may have found its lags far off
     lags: Bases = grid([each for each in fitter.unknowns(group) if each.name in LAGS])
     frictions: Bases = [{}]
+    held = valve.values['f_s']
+    shown: dict[str, Bases] = {}
     if group.has_stem:
         results = fitter.results(valve)
         # whole slips would hide a swing
@@ -71,7 +83,9 @@ def race(
             'steps': fitter.bench.steps_of_x,
             **calibration_seen(fitter.bench, results),
         }
-        frictions = friction_grid(friction_seen(fitter.bench, results)[0])
+        held = friction_seen(fitter.bench, results)[0]
+        frictions = friction_grid(held)
+        shown = {DWELL: dwell_seen(fitter.bench, results)}
     done = 0
 
     def count(runner: Valve) -> Valve:
@@ -81,7 +95,8 @@ def race(
         return runner
 
     def screened(candidate: Candidate) -> Valve:
-        return _screened(fitter, candidate, group, valve, candidate.starts(seen), frictions, lags)
+        own = candidate.starts(seen) + candidate.suited(shown.get(candidate.effect, []))
+        return _screened(fitter, candidate, group, valve, own, frictions, lags, held)
 
     def evolved(runner: Valve, generations: int) -> Valve:
         more = fitter.evolve(runner, fitter.problem(group, runner), generations)
@@ -231,9 +246,8 @@ def rebased(fitter: Fitter, group: Group, valve: Valve, runners: Sequence[Valve]
         replace(valve, values={**valve.values, **{name: r.values[name] for name in names}})
         for r in runners
     ]
-    costs = [fitter.score(each, group.signal, fitter.drive) for each in there]
-    best = there[int(np.argmin(costs))]
-    return min(valve, fitter.fit(best, problem), key=by_cost)
+    best = min((fitter.fit(each, problem) for each in there), key=by_cost)
+    return min(valve, fitter.refined(best, problem) if group.has_stem else best, key=by_cost)
 
 
 def _screened(
@@ -244,8 +258,12 @@ def _screened(
     own: Sequence[dict[str, float]],
     frictions: Bases,
     lags: Bases,
+    held: float,
 ) -> Valve:
-    """Return the valve with one more effect after a short refit of its group."""
+    """Return the valve with one more effect after a short refit of its group.
+
+    `own` are starts of the effect, `held` is what holds the stem as the data show it [% of span].
+    """
     there = replace(
         valve,
         effects=tuple(dict.fromkeys((*valve.effects, candidate.effect))),
@@ -258,15 +276,20 @@ def _screened(
         costs = [fitter.scan(there, [{**usual, **start}], way)[0].cost for start in own]
         own = [own[index] for index in np.argsort(costs, kind='stable')[:FEWER_STARTS]]
 
+    levels = [level for level in (usual['f_s'], held) if level > 0.0]
+
     def around(bases: Bases) -> list[Bases]:
+        each = [[candidate.balanced(level, usual, start) for level in levels] for start in own]
         return [
-            [{**usual, **base, **start} for base in (candidate.balanced(usual, start), *bases)]
-            for start in own
+            [{**usual, **base, **start} for base in (*some, *bases)]
+            for some, start in zip(each, own, strict=True)
         ]
 
     def best(starts: Sequence[Bases], way: Problem, count: int) -> list[Valve]:
         each = [fitter.scan(there, some, way)[0] for some in starts]
-        return sorted(each, key=by_cost)[:count]
+        best = sorted(each, key=by_cost)[:count]
+        # without the effect a stem may have been found that creeps instead of swinging
+        return [with_any_stem(fitter, one, way) for one in best] if group.has_stem else best
 
     starts = around(frictions if group.has_stem else lags)
     found = best(starts, problem, SCREENED if group.has_stem else SCREENED_IF_SMOOTH)
@@ -274,8 +297,10 @@ def _screened(
     if group.has_stem and lags != [{}] and first:
         anew = [some[1:] for some in around(lags)]
         found += [fitter.fit(each, way, SHORT) for each in best(anew, way, 1)]
+    effect = CATALOGUE[candidate.effect]
     # in a second look the stem is put to rest for all
-    if CATALOGUE[candidate.effect].rugged and first and PUT_TO_REST.isdisjoint(fitter.drive):
+    led = RESTS in fitter.drive or (effect.laborious and not PUT_TO_REST.isdisjoint(fitter.drive))
+    if effect.rugged and first and not led:
         found += _slip_by_slip(fitter, there, [one for some in starts for one in some], problem)
     elif way != problem:
         found += [fitter.fit(each, way, SHORT) for each in best(starts, way, 1)]
@@ -292,14 +317,15 @@ def _slip_by_slip(
     made of the one before: the cost has few valleys then.
     """
     unknowns, signal, drive = problem
-    alone = (unknowns, signal, (*drive, RESTS))
+    alone = (unknowns, signal, (*(each for each in drive if each not in PUT_TO_REST), RESTS))
     apart: dict[tuple[float, ...], list[Mapping[str, float]]] = {}
     names = [unknown.name for unknown in unknowns if unknown.name != 'f_s']
     for start, stem in product(starts, STEMS):
         values = {**start, **stem}
         apart.setdefault(tuple(values[name] for name in names), []).append(values)
     nearest = [fitter.scan(valve, some, alone)[0] for some in apart.values()]
-    each = sorted((fitter.fit(one, alone, DESCENT) for one in nearest), key=by_cost)
+    begun = sorted((fitter.fit(one, alone, SHORT) for one in nearest), key=by_cost)
+    each = sorted((fitter.fit(one, alone, DESCENT) for one in begun[:BEGUN]), key=by_cost)
     found: list[Valve] = []
     for there in each[:FOLLOWED]:
         for way in (alone, *eased(problem)):

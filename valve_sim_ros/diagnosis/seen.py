@@ -6,10 +6,12 @@ from collections.abc import Sequence
 import math
 
 import numpy as np
+from scipy.optimize import least_squares
 
 from ..model.pipeline import Array
 from .bench import Bench
 from .readings import answers_to_steps
+from .stretch import Stretch
 
 ENOUGH_STEPS, LEAST_EACH = 6, 2
 """From so many single steps of the command on, so many late and on time tell of mixed arrivals."""
@@ -24,6 +26,10 @@ SPANS = tuple(np.geomspace(0.7, 1.4, 50).tolist())
 """Spans of the sensor that are tried."""
 LEAST_RESTS = 20
 """Samples at rest that show what holds the stem."""
+DWELL, DWELLS, SCATTER = 'dwell_friction', tuple(np.geomspace(0.5, 200.0, 16).tolist()), 0.2
+"""The effect, time constants that are tried [s], and how far what holds the stem scatters [%]."""
+LEAST_LEFT, LEAVES = 6, 4.0
+"""Rests that show friction which grows, and how far a stem is away that has left one [noise]."""
 
 
 def friction_seen(
@@ -54,6 +60,55 @@ def calibration_seen(bench: Bench, results: Sequence[Array]) -> dict[str, tuple[
     if math.isnan(middle):
         return {}
     return {'zeros': (0.0, -span * middle), 'spans': (1.0, span)}
+
+
+def dwell_seen(bench: Bench, results: Sequence[Array]) -> list[dict[str, float]]:
+    """Return starts of a friction that grows with the time at rest, one of each form of its law.
+
+    From what holds the stem when it leaves each rest: static friction and growth are straight in
+    it, the time constant is tried. `results` as for `friction_seen`; none if rests are few.
+    """
+    pairs = zip(bench.stretches, results, strict=True)
+    each = [_rests(bench, s, result) for s, result in pairs if s.rests.size]
+    rest, force = np.concatenate([*each, np.empty((0, 2))]).T
+    if rest.size < LEAST_LEFT:
+        return []
+    found = []
+    for shape in (0.0, 1.0):
+        best, least = {}, math.inf
+        for time_constant in DWELLS:
+            part = rest / time_constant
+            grown = part / (1.0 + part) if shape else 1.0 - np.exp(-part)
+
+            def missing(level: Array, grown: Array = grown) -> Array:
+                return level[0] + level[1] * grown - force
+
+            fit = least_squares(missing, (np.median(force), 0.0), loss='cauchy', f_scale=SCATTER)
+            f_s, more = fit.x
+            if fit.cost < least and f_s > 0.0 and more > 0.0:
+                least = fit.cost
+                values = {'growth': more / f_s, 'time_constant': time_constant, 'shape': shape}
+                best = {'f_s': f_s, **{f'{DWELL}.{name}': v for name, v in values.items()}}
+        found += [best] if best else []
+    return found
+
+
+def _rests(bench: Bench, stretch: Stretch, result: Array) -> Array:
+    """Return how long each rest lasted [s] and what then held the stem [%], shape (n, 2)."""
+    x, near = stretch.measured['x'], LEAVES * bench.noise['x']
+    known = np.isfinite(stretch.rests).astype(int)
+    edges = np.flatnonzero(np.diff(known, prepend=0, append=0))
+    found: dict[int, tuple[float, float]] = {}
+    for begin, end in zip(edges[::2], edges[1::2], strict=True):
+        level = float(np.median(stretch.rests[begin:end]))
+        away = np.flatnonzero(np.abs(x - level) > near)  # where lost, x is not away
+        before, after = away[away < begin], away[away >= end]
+        if before.size and after.size:  # nobody knows how long the first and last rests last
+            first, left = int(before[-1]) + 1, int(after[0])
+            last = float(result[1, left - 1 : left + 1].mean())
+            if abs(last - result[1, first]) > 2.0 * near:  # else it may creep with p2
+                found[first] = float(stretch.time[left] - stretch.time[first]), abs(last - level)
+    return np.array(list(found.values())).reshape(-1, 2)
 
 
 def mixed_arrivals(bench: Bench, results: Sequence[Array]) -> bool:

@@ -49,15 +49,28 @@ class Candidate:
             {**self.neutral, **dict(zip(names, values, strict=True))} for values in product(*each)
         ]
 
+    def suited(self, starts: Iterable[Mapping[str, float]]) -> list[dict[str, float]]:
+        """Return the starts of the effect in which what a fit does not free is neutral."""
+        fixed = {f'{self.effect}.{name}' for name in self.names} ^ {*self.neutral}
+        return [
+            {**self.neutral, **start}
+            for start in starts
+            if all(start.get(name, self.neutral[name]) == self.neutral[name] for name in fixed)
+        ]
+
     def balanced(
-        self, values: Mapping[str, float], start: Mapping[str, float]
+        self, level: float, values: Mapping[str, float], start: Mapping[str, float]
     ) -> dict[str, float]:
-        """Return the friction with which a start holds the stem as the valve without it does."""
+        """Return the friction with which a start holds the stem as a level [%] does without it.
+
+        The stem moves as it does with `values`.
+        """
         effect = CATALOGUE[self.effect]
         if effect.balance is None:
             return {}
-        factor = effect.balance(*(start[f'{self.effect}.{p.name}'] for p in effect.parameters))
-        return {'f_s': values['f_s'] * factor, 'f_d/f_s': min(values['f_d/f_s'] / factor, 1.0)}
+        f_s = effect.balance(level, *(start[f'{self.effect}.{p.name}'] for p in effect.parameters))
+        f_d = values['f_s'] * values['f_d/f_s']
+        return {'f_s': f_s, 'f_d/f_s': min(f_d / f_s, 1.0)}
 
 
 def starts_of(parameter: EffectParameter) -> tuple[float, ...]:

@@ -169,8 +169,8 @@ class Effect:
     variants : tuple of tuple of str
         Alternative sets of parameters for a search to free; one set with all by default.
     balance : callable, optional
-        Of its own parameters: by which factor f_s must change for the valve to hold its stem about
-        as it did without the effect. Searches start there too.
+        Of a level of f_s and its own parameters: the f_s with which it holds the stem about as
+        that level does without the effect. Searches start there too.
     references : tuple of str
         Where the physics comes from.
     """

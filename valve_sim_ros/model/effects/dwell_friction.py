@@ -87,10 +87,11 @@ EFFECT = Effect(
     longest_step=0.1,
     order=50,
     variants=(('growth', 'time_constant'), ('growth', 'time_constant', 'shape')),
-    balance=lambda growth, *_: 1.0 / (1.0 + growth),
+    balance=lambda f_s, growth, *_: f_s / (1.0 + growth),
     explanation='The packing creeps into the stem while it rests and holds it more firmly.',
     symptom='The first jump after a long rest is larger than those after short ones.',
     confirm='Equal steps after rests of 1 s, 10 s and 100 s.',
+    rugged=True,
     twins={
         'linkage_backlash': 'a loose linkage hides the start of every reversal, whatever the rest',
         'stribeck_friction': 'that one depends on the speed, not on the rest',

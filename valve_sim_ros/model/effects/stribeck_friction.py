@@ -143,6 +143,7 @@ EFFECT = Effect(
             'linear',
             'Speed at which friction falls',
             starts=(1.0, 4.0, 15.0),
+            usual=(0.5, 32.0),
         ),
     ),
     slots={'motion_slot': motion},

@@ -1,0 +1,73 @@
+# Copyright 2026 The valve_sim_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""What slips show of the stem, of friction that grows at rest, and what they hang on."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from valves import recording, VALUES
+
+from valve_sim_ros.diagnosis import odds
+from valve_sim_ros.diagnosis.base_valve import on_time
+from valve_sim_ros.diagnosis.bench import Bench
+from valve_sim_ros.diagnosis.fitting import Fitter, Valve
+from valve_sim_ros.diagnosis.seen import dwell_seen
+from valve_sim_ros.diagnosis.stages import groups
+from valve_sim_ros.diagnosis.unknowns import complete
+from valve_sim_ros.recordings.recording import Recording
+
+STARTING = {'p1_0': 0.0, 'p2_0': 0.0, 'x_0': 0.0}
+DWELL = {'dwell_friction.growth': 0.6, 'dwell_friction.time_constant': 8.0}
+
+
+def fitter_of(**effects):
+    bench = Bench([recording(noise=0.2, **effects)])
+    return Fitter(bench), groups(bench.signals)[-1], Valve({**VALUES, **STARTING})
+
+
+def held_after(rest, law):
+    """Return what holds a stem after a time at rest, by the exponential law."""
+    grown = 1.0 - np.exp(-rest / law['dwell_friction.time_constant'])
+    return law['f_s'] * (1.0 + law['dwell_friction.growth'] * grown)
+
+
+def test_rests_of_all_lengths_show_how_friction_grows():
+    rng = np.random.default_rng(3)
+    pieces = [np.full(20, 30.0)]
+    for k in range(60):  # up and down slowly, with rests between
+        pieces.append(np.linspace(30.0, 65.0, 50)[:: 1 - 2 * (k % 2)])
+        pieces.append(np.full(rng.integers(1, 150), pieces[-1][-1]))
+    u = np.concatenate(pieces)
+    there = {**VALUES, 'T_g1': 0.1, 'T_g2': 0.1, **dict.fromkeys(STARTING, 30.0), **DWELL}
+    bench = Bench([Recording(0.2 * np.arange(u.size), u, p1=u)])
+    (truth,) = bench.run(complete({**there, 'dwell_friction.shape': 0.0}), ('dwell_friction',))
+    noisy = truth[:3] + 0.2 * rng.standard_normal((3, u.size))
+    fitter = Fitter(Bench([Recording(0.2 * np.arange(u.size), u, *noisy)]))
+    group, valve = groups(fitter.bench.signals)[-1], Valve(there)
+    law, _ = dwell_seen(fitter.bench, fitter.results(valve))
+    for rest in (5.0, 30.0):
+        assert held_after(rest, law) == pytest.approx(held_after(rest, there), rel=0.1)
+    dwell = [each for each in group.candidates() if each.effect == 'dwell_friction']
+    suited = [each.suited(dwell_seen(fitter.bench, fitter.results(valve))) for each in dwell]
+    assert [len(each) for each in suited] == [1, 2]
+
+
+def test_a_play_holds_the_stem_with_less_friction():
+    _, group, valve = fitter_of()
+    play = next(each for each in group.candidates() if each.effect == 'linkage_backlash')
+    there = play.balanced(6.0, valve.values, {'linkage_backlash.width': 3.0})
+    assert there['f_s'] == pytest.approx(4.5)
+
+
+def test_what_slips_leave_that_hang_on_noise_is_no_gap():
+    fitter, group, valve = fitter_of()
+    far = replace(valve, values={**valve.values, 'f_s': 1.03 * VALUES['f_s']})
+    left = on_time(fitter, group, far)
+    assert left.excess <= odds.SPOTLESS
+    assert left.far < odds.MORE_FAR
+
+
+def test_friction_that_differs_by_direction_is_one():
+    fitter, group, valve = fitter_of(**{'friction_asymmetry.difference': 0.3})
+    assert on_time(fitter, group, valve).excess > odds.SPOTLESS
