@@ -21,7 +21,9 @@ from .fitting import (
     by_cost,
     eased,
     FAINT,
+    FINE,
     Fitter,
+    GENERATIONS,
     LONG,
     Problem,
     SHORT,
@@ -30,7 +32,7 @@ from .fitting import (
 from .seen import calibration_seen, DWELL, dwell_seen, friction_seen
 from .stages import Candidate, Group
 from .starts import friction_grid, grid, STEMS
-from .stretch import PUT_TO_REST, RESTS
+from .stretch import CAUGHT, PUT_TO_REST, RESTS
 
 ROUNDS = ((40, 5), (10, 14), (4, 30))
 """Rounds of a race where costs are rugged: how many still run, and for how many generations."""
@@ -328,10 +330,14 @@ def _slip_by_slip(
     each = sorted((fitter.fit(one, alone, DESCENT) for one in begun[:BEGUN]), key=by_cost)
     found: list[Valve] = []
     for there in each[:FOLLOWED]:
-        for way in (alone, *eased(problem)):
-            there = fitter.evolve(there, way, TURNS, FINEST)
+        for way in eased(problem):
+            # where the moment of a slip hardly counts, all but one valley is gone
+            first = CAUGHT in way[2]
+            turns, spread = (GENERATIONS, FINE) if first else (TURNS, FINEST)
+            more = fitter.evolve(there, way, turns, spread)
+            there = fitter.fit(more, way, DESCENT)
             excess = leftover(fitter.residuals(there, signal, way[2])).excess
-            if way != alone and excess > FAR_OFF:
+            if excess > FAR_OFF:
                 break
         else:
             found.append(fitter.fit(there, problem, DESCENT))

@@ -36,7 +36,7 @@ STEMS = (
 """A stem that creeps to its place, and one that overshoots."""
 SWEEP = tuple(
     {'a_1/a_2': rate, 'damping': damping}
-    for rate in (4.0, 10.0, 25.0, 60.0)
+    for rate in (10.0, 25.0, 60.0)
     for damping in (0.25, 0.5, 1.0, 3.0)
 )
 """Stems of all kinds: from one that swings into one that creeps, no fit leads."""
