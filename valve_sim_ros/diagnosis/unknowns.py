@@ -55,7 +55,7 @@ BASE_UNKNOWNS: dict[str, tuple[Unknown, ...]] = {
         _log('f_s', 0.01, DECLARED['f_s'].upper),
         Unknown('f_d/f_s', 0.0, 1.0, 'linear', 0.03),
         _log('a_1/a_2', SLOWEST, 80.0, 0.1),
-        _log('damping', 0.25, 5.0, 0.1),
+        _log('damping', 0.1, 5.0, 0.1),
     ),
 }
 """The base valve's unknowns by stage; `damping` is a_2 / (2 sqrt(a_1))."""
