@@ -6,7 +6,6 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from functools import partial
-from itertools import product
 import os
 
 import numpy as np
@@ -17,22 +16,12 @@ from ..model.pipeline import Array
 from . import odds
 from .adequacy import leftover
 from .base_valve import find_base, with_any_stem
-from .fitting import (
-    by_cost,
-    eased,
-    FAINT,
-    FINE,
-    Fitter,
-    GENERATIONS,
-    LONG,
-    Problem,
-    SHORT,
-    Valve,
-)
+from .fitting import by_cost, eased, FAINT, Fitter, LONG, Problem, SHORT, Valve
 from .seen import calibration_seen, DWELL, dwell_seen, friction_seen
+from .single_slips import slip_by_slip
 from .stages import Candidate, Group
-from .starts import friction_grid, grid, STEMS
-from .stretch import CAUGHT, PUT_TO_REST, RESTS
+from .starts import friction_grid, grid
+from .stretch import PUT_TO_REST, RESTS
 
 ROUNDS = ((40, 5), (10, 14), (4, 30))
 """Rounds of a race where costs are rugged: how many still run, and for how many generations."""
@@ -42,12 +31,6 @@ so many of the best."""
 SCREENED, SCREENED_IF_SMOOTH, FINISHERS, REFINED = 3, 8, 5, 2
 """How many starts of a candidate are followed (more without a stem: such fits are quick), runners
 refitted, and refined to the end."""
-BEGUN, DESCENT, FOLLOWED, TURNS, FINEST = 8, 12, 3, 25, 0.3
-"""So many starts are led to single slips; steps of that descent; so many of its ends are taken on
-to all slips, by evolutions of so many generations that begin with so little spread [steps of
-unknowns]."""
-FAR_OFF = 1.0
-"""Excess of a caught stem beyond which it is not worth while to let it go."""
 FAR_AHEAD, BEHIND = 0.2, 0.5
 """Where the best leaves no more than this part of the cost, or nothing but noise, runners short of
 more than a part of its gain are not followed."""
@@ -303,47 +286,11 @@ def _screened(
     # in a second look the stem is put to rest for all
     led = RESTS in fitter.drive or (effect.laborious and not PUT_TO_REST.isdisjoint(fitter.drive))
     if effect.rugged and first and not led:
-        found += _slip_by_slip(fitter, there, [one for some in starts for one in some], problem)
+        found += slip_by_slip(fitter, there, [one for some in starts for one in some], problem)
     elif way != problem:
         found += [fitter.fit(each, way, SHORT) for each in best(starts, way, 1)]
     steps = SHORT if group.has_stem else LONG
     return min((fitter.fit(each, problem, steps) for each in found), key=by_cost)
-
-
-def _slip_by_slip(
-    fitter: Fitter, valve: Valve, starts: Sequence[Mapping[str, float]], problem: Problem
-) -> list[Valve]:
-    """Return valves that were fitted to single slips first, and then to all in a row.
-
-    A stem that is put to rest wherever it was seen to rest begins each slip right, whatever it
-    made of the one before: the cost has few valleys then.
-    """
-    unknowns, signal, drive = problem
-    alone = (unknowns, signal, (*(each for each in drive if each not in PUT_TO_REST), RESTS))
-    apart: dict[tuple[float, ...], list[Mapping[str, float]]] = {}
-    names = [unknown.name for unknown in unknowns if unknown.name != 'f_s']
-    for start, stem in product(starts, STEMS):
-        values = {**start, **stem}
-        apart.setdefault(tuple(values[name] for name in names), []).append(values)
-    nearest = [fitter.scan(valve, some, alone)[0] for some in apart.values()]
-    begun = sorted((fitter.fit(one, alone, SHORT) for one in nearest), key=by_cost)
-    each = sorted((fitter.fit(one, alone, DESCENT) for one in begun[:BEGUN]), key=by_cost)
-    found: list[Valve] = []
-    for there in each[:FOLLOWED]:
-        for way in eased(problem):
-            # where the moment of a slip hardly counts, all but one valley is gone
-            first = CAUGHT in way[2]
-            turns, spread = (GENERATIONS, FINE) if first else (TURNS, FINEST)
-            more = fitter.evolve(there, way, turns, spread)
-            there = fitter.fit(more, way, DESCENT)
-            excess = leftover(fitter.residuals(there, signal, way[2])).excess
-            if excess > FAR_OFF:
-                break
-        else:
-            found.append(fitter.fit(there, problem, DESCENT))
-        if excess <= odds.CLEAN:
-            break
-    return found
 
 
 def _swings(fitter: Fitter, residual: Array) -> tuple[float, ...]:
