@@ -85,14 +85,12 @@ def find_base(
     found = followed(problem)
     if roughly:
         return found[0]
-    if group.has_stem:
-        swept = [with_any_stem(fitter, each, problem) for each in found[:SWEPT]]
-        found = sorted(
-            [*found, *(fitter.fit(each, problem, SHORT) for each in swept)], key=by_cost
-        )
     if not group.has_stem:
         best = fitter.refined(found[0], problem)
         return put_in_its_period(fitter, group, best, problem)
+    swept = [with_any_stem(fitter, each, problem) for each in found[:SWEPT]]
+    found += [fitter.fit(each, problem, SHORT) for each in swept]
+    found.sort(key=by_cost)
     best = fitter.fit(found[0], problem)
     left = leftover(fitter.residuals(best, group.signal, drive))
     if not (closely or odds.suspicious(left, group, fitter.bench.mixed)):

@@ -40,7 +40,7 @@ def slip_by_slip(
     found: list[Valve] = []
     for there in each[:FOLLOWED]:
         for way in eased(problem):
-            # where the moment of a slip hardly counts, all but one valley is gone
+            # single slips hardly tell the law: it is found where their moments hardly count
             first = CAUGHT in way[2]
             turns, spread = (GENERATIONS, FINE) if first else (TURNS, FINEST)
             more = fitter.evolve(there, way, turns, spread)
