@@ -10,7 +10,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from .physics import Physics
+from .physics import FAR, Physics
 from .valves import either_sign, log_uniform
 
 Rng = np.random.Generator
@@ -23,8 +23,9 @@ def ip_dead_time(rng: Rng, valve: Physics, length: float) -> Changes:
 
 
 def ip_lag(rng: Rng, valve: Physics, length: float) -> Changes:
-    """Lag the inlet pressure."""
-    return {'ip_tau': log_uniform(rng, 0.05, 4.0)}
+    """Lag the inlet pressure, or the command before the play."""
+    tau = log_uniform(rng, 0.05, 4.0)
+    return {'ip_tau': tau} if rng.random() < 0.7 else {'smoothing': tau, 'smoothing_error': FAR}
 
 
 def off_line(rng: Rng, device: str, zero: float, span: float, one: float) -> Changes:

@@ -7,7 +7,7 @@ from math import pi
 import numpy as np
 import pytest
 
-from blind.physics import Physics
+from blind.physics import FAR, Physics
 from blind.plant import simulate as blind_simulate
 from valve_sim_ros import InitialState, simulate, ValveSpec
 from valve_sim_ros.model.effects import CATALOGUE
@@ -82,6 +82,11 @@ SAME = {
 }
 
 OTHER_FORMS = [
+    (
+        'ip_lag',
+        {'smoothing': 1.5, 'smoothing_error': FAR},
+        {'time_constant': 1.5, 'upstream': 1.0},
+    ),
     ('ip_nonlinearity', {'ip_power': 0.8}, {'bow': 0.0, 'exponent': 0.8}),
     ('rate_limit', {'p2_rate_up': 3.0}, {'pressure_rate': 1000.0, 'filling_rate': 3.0}),
     ('rate_limit', {'p2_rate_down': 3.0}, {'pressure_rate': 1000.0, 'emptying_rate': 3.0}),

@@ -17,6 +17,8 @@ FAR = 4.5
 """Errors beyond this are hardly ever noise [noise]."""
 QUIET = 0.3
 """The quietest share of the windows shows the noise."""
+ONE_SLIP = 0.01
+"""The share of a record in which a single slip is over, and the stem where it should be."""
 LOWEST, HIGHEST = 0.3, 8.0
 """What may be noise [that seen from sample to sample]: a swinging model leaves no quiet window."""
 
@@ -72,6 +74,18 @@ def leftover(residual: Array) -> Leftover:
         inflation,
         int(np.sum(sizes > FAR * floor**0.5)),
     )
+
+
+def but_one_slip(residual: Array) -> Array:
+    """Return the residual of a signal over its noise without the worst short span, shape (n,)."""
+    far = np.flatnonzero(np.abs(residual) > FAR * leftover(residual).floor ** 0.5)
+    if not far.size:
+        return residual
+    ends = far + max(int(ONE_SLIP * residual.size), WINDOW)
+    worst = np.argmax(np.searchsorted(far, ends) - np.arange(far.size))
+    rest = residual.copy()
+    rest[far[worst] - 1 : ends[worst]] = np.nan
+    return rest
 
 
 def _inflation(windows: Array) -> float:

@@ -12,14 +12,14 @@ from .bench import Bench, MIXED_JITTER
 from .fitting import by_cost, eased, FINE, Fitter, NARROW, Problem, SHORT, Valve
 from .seen import friction_seen, mixed_arrivals
 from .stages import Group
-from .starts import friction_grid, grid, START, STEMS, SWEEP
+from .starts import friction_grid, grid, nearby, START, STEMS, SWEEP
 from .unknowns import EARLY, LATE, PHASE, Unknown
 
 FEW_STARTS = 3
 """So many starts are followed."""
-SWEPT, FOLLOWED, GENERATIONS = 4, 4, 30
+SWEPT, FOLLOWED, GENERATIONS, PATIENT = 4, 4, 30, 150
 """So many base valves are tried with stems of all kinds; so many are followed by an evolution
-where costs are rugged, and for how long."""
+where costs are rugged, and for how long: longer along a narrow valley."""
 NEARLY = 0.95
 """Phase beyond which a command acts nearly a whole period late or early."""
 LAG, CLEARLY = 'ip_lag', 50.0
@@ -69,9 +69,7 @@ def find_base(
             seen, _ = friction_seen(fitter.bench, fitter.results(valve))
             around = friction_grid(seen)
             starts += [{**valve.values, **there, **stem} for there in around for stem in STEMS]
-        levels = dict.fromkeys(start[name] for start in starts)
-        apart = [[start for start in starts if start[name] == level] for level in levels]
-        most = 1
+        apart, most = _apart(starts, name), 1
 
     def followed(way: Problem) -> list[Valve]:
         tried = [each for some in apart for each in fitter.scan(valve, some, way, most)]
@@ -99,7 +97,11 @@ def find_base(
     way = eased(problem)[0]
     eases = found if way == problem else followed(way)
     rested = [fitter.evolve(each, way, GENERATIONS, NARROW) for each in eases]
-    found += [fitter.fit(each, problem, SHORT) for each in rested]
+    if len(group.stages) > 1:  # lags make up for friction
+        kinds = _apart(nearby(best.values), 'f_d/f_s')
+        tried = sorted((fitter.scan(best, some, way)[0] for some in kinds), key=by_cost)
+        rested += [fitter.evolve(each, way, PATIENT, FINE) for each in tried[:FEW_STARTS]]
+    found += [fitter.fit(each, problem) for each in rested]
     found = sorted(found, key=by_cost)[:FOLLOWED]
     found += [fitter.evolve(each, problem, GENERATIONS, NARROW) for each in found]
     return fitter.refined(min(found, key=by_cost), problem)
@@ -115,6 +117,12 @@ def on_time(fitter: Fitter, group: Group, valve: Valve) -> Leftover:
     for way, spread in zip(ways, (NARROW, FINE), strict=True):
         valve = fitter.fit(fitter.evolve(valve, way, GENERATIONS, spread), way)
     return leftover(fitter.residuals(valve, group.signal, way[2]))
+
+
+def _apart(starts: Sequence[dict[str, float]], name: str) -> list[list[dict[str, float]]]:
+    """Return the starts in groups of one value of an unknown each."""
+    levels = dict.fromkeys(start[name] for start in starts)
+    return [[start for start in starts if start[name] == level] for level in levels]
 
 
 def with_any_stem(fitter: Fitter, valve: Valve, problem: Problem) -> Valve:

@@ -10,9 +10,9 @@ from functools import partial
 from ..identification.watch import Progress, Stop
 from . import dead_time, odds
 from .adequacy import leftover
-from .base_valve import find_base
+from .base_valve import find_base, PATIENT
 from .coarse import rounded
-from .fitting import Fitter, GENERATIONS, NARROW, Valve
+from .fitting import by_cost, FINE, Fitter, GENERATIONS, NARROW, Valve
 from .ladder import climb, concluded, excused, Ladder
 from .rung import Rung
 from .stages import Group
@@ -115,6 +115,8 @@ def _second_look(fitter: Fitter, ladder: Ladder, again: Callable[[], Ladder]) ->
     for how in (CAUGHT, RESTS):
         fitter.drive = (*drive, how)
         found = concluded(again())
+        if found.outcome != 'missing_effect' and found.best_guess:
+            found = _patiently(fitter, found, found.best_guess)
         fitter.drive = drive
         complete = complete and found.complete
         if found.outcome == 'missing_effect':
@@ -127,6 +129,27 @@ def _second_look(fitter: Fitter, ladder: Ladder, again: Callable[[], Ladder]) ->
     return replace(ladder, complete=complete)
 
 
+def _patiently(fitter: Fitter, ladder: Ladder, guess: Rung) -> Ladder:
+    """Return the ladder with a name that explains most, if it explains x after a long search."""
+    if guess.closed < odds.LEAST_LED:
+        return ladder
+    *others, _ = guess.valve.candidates
+    found = []
+    for each in ladder.group.candidates():
+        if each.effect == guess.effect:
+            valve = replace(guess.valve, candidates=(*others, each))
+            problem = fitter.problem(ladder.group, valve)
+            found.append(fitter.fit(fitter.evolve(valve, problem, PATIENT, FINE), problem))
+    return _named(fitter, ladder, replace(guess, valve=min(found, key=by_cost)))
+
+
+def _named(fitter: Fitter, ladder: Ladder, rung: Rung) -> Ladder:
+    """Return the ladder concluded with one name only."""
+    after = leftover(fitter.residuals(rung.valve, ladder.group.signal))
+    rung = replace(rung, before=ladder.before, after=after, closed=ladder.before.closed_by(after))
+    return concluded(replace(ladder, valve=rung.valve, after=after, rungs=(rung,)))
+
+
 def _let_go(fitter: Fitter, ladder: Ladder, guess: Rung | None) -> Ladder | None:
     """Return the ladder with a name that explains x once the stem is free, or None.
 
@@ -134,12 +157,8 @@ def _let_go(fitter: Fitter, ladder: Ladder, guess: Rung | None) -> Ladder | None
     """
     if guess is None or guess.closed < odds.LEAST_LED:
         return None
-    group, before = ladder.group, ladder.before
-    valve = fitter.refined(guess.valve, fitter.problem(group, guess.valve))
-    after = leftover(fitter.residuals(valve, group.signal))
-    closed = before.closed_by(after)
-    rung = replace(guess, valve=valve, before=before, after=after, closed=closed)
-    found = concluded(replace(ladder, valve=valve, after=after, rungs=(rung,)))
+    valve = fitter.refined(guess.valve, fitter.problem(ladder.group, guess.valve))
+    found = _named(fitter, ladder, replace(guess, valve=valve))
     return found if found.outcome == 'missing_effect' else None
 
 

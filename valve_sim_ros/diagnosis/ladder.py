@@ -9,12 +9,12 @@ from typing import Literal
 
 from ..model.effects import CATALOGUE
 from . import odds
-from .adequacy import Leftover, leftover
+from .adequacy import but_one_slip, Leftover, leftover
 from .arrivals import put_in_its_period
 from .base_valve import find_base, on_other_side, on_time
 from .fitting import by_cost, Fitter, Valve
 from .loosening import loosened
-from .race import deepened, race, rebased
+from .race import race, rebased
 from .rung import judged, Rung
 from .stages import Candidate, Group
 from .stretch import PUT_TO_REST
@@ -130,18 +130,21 @@ def climb(
                     now, before = loose, left
             base, base_left = now, before
         if group.has_stem and not again and worth(before):
-            caught = on_time(fitter, group, now)
-            if caught.excess <= odds.SPOTLESS and caught.far < odds.MORE_FAR:
-                before = base_left = chance = caught
+            rest = leftover(but_one_slip(fitter.residuals(now, group.signal)))
+            if not worth(rest):
+                before = base_left = chance = rest
+            else:
+                rest = on_time(fitter, group, now)
+                if rest.excess <= odds.SPOTLESS and rest.far < odds.MORE_FAR:
+                    before = base_left = chance = rest
         for step in range(MOST_EFFECTS):
             some = sought(before)
             if not some:
                 break
             told = _within(progress, step)
-            runners = race(fitter, group, now, some, told)
             # in the second look the stem is put to rest already, no valley of the base is missed
-            if group.has_stem and some is candidates and not rungs and not again:
-                runners = deepened(fitter, group, now, runners, told)
+            deeply = group.has_stem and some is candidates and not rungs and not again
+            runners = race(fitter, group, now, some, told, deeply=deeply)
             now = rebased(fitter, group, now, runners[:5])
             before = leftover(fitter.residuals(now, group.signal))
             if not rungs:

@@ -9,6 +9,7 @@ import numpy as np
 
 from ..identification.fitness import fitness
 from ..model.pipeline import Array
+from ..model.scoring import BESIDE
 from ..recordings.recording import OUTPUTS
 from .conditions import Mask
 from .fitting import Fitter, Valve
@@ -60,6 +61,7 @@ def prove(
     base: Valve,
     augmented: Valve,
     floors: Mapping[str, float],
+    drive: tuple[str, ...] = (),
 ) -> dict[str, Gap]:
     """Fit both valves to the first part, and measure them on both parts.
 
@@ -73,6 +75,8 @@ def prove(
         Fitted to all data.
     floors : mapping of str to float
         Mean square of the noise by signal, over that seen from sample to sample.
+    drive : tuple of str
+        What puts the stem where it was measured: x is then what is held beside the measured one.
 
     Returns
     -------
@@ -87,16 +91,17 @@ def prove(
     refits = []
     for valve in (base, augmented):
         for group in groups:
-            valve = fitter.fit(valve, fitter.problem(group, valve), REFIT)
+            unknowns, signal, _ = fitter.problem(group, valve)
+            valve = fitter.fit(valve, (unknowns, signal, drive), REFIT)
         refits.append(valve)
     for stretch, every in zip(bench.stretches, counts, strict=True):
         stretch.recount(every)
     held_out = np.concatenate(parts)
     gaps = {}
-    results = [bench.run(complete(each.values), each.effects) for each in refits]
+    results = [bench.run(complete(each.values), each.effects, drive) for each in refits]
     for name in bench.signals:
         measured = np.concatenate([stretch.counts[name] for stretch in bench.stretches])
-        row = OUTPUTS.index(name)
+        row = BESIDE if drive and name == 'x' else OUTPUTS.index(name)
         models = [np.concatenate([each[row] for each in result]) for result in results]
         noise = bench.noise[name] * np.sqrt(floors[name])
         gaps[name] = Gap(

@@ -20,7 +20,7 @@ from .fitting import by_cost, eased, FAINT, Fitter, LONG, Problem, SHORT, Valve
 from .seen import calibration_seen, DWELL, dwell_seen, friction_seen
 from .single_slips import slip_by_slip
 from .stages import Candidate, Group
-from .starts import friction_grid, grid
+from .starts import friction_grid, grid, SHARES, START
 from .stretch import PUT_TO_REST, RESTS
 
 ROUNDS = ((40, 5), (10, 14), (4, 30))
@@ -35,8 +35,8 @@ FAR_AHEAD, BEHIND = 0.2, 0.5
 """Where the best leaves no more than this part of the cost, or nothing but noise, runners short of
 more than a part of its gain are not followed."""
 NEARLY_ALL = 0.02
-"""What the best may leave of the excess, and no more than noise, where laborious effects that do
-not look like it are not tried."""
+"""What the best may leave of the excess, and no more than noise, where effects that take long and
+do not look like it are not tried."""
 
 DEEPENED = 3
 """So many effects are searched more deeply where none explains what is left."""
@@ -51,11 +51,17 @@ def race(
     valve: Valve,
     candidates: Sequence[Candidate],
     progress: Callable[[float], object] = lambda share: None,
+    *,
+    deeply: bool = False,
 ) -> list[Valve]:
-    """Return valves with one more effect, best first; the better, the more refitted."""
+    """Return valves with one more effect, best first; the better, the more refitted.
+
+    `deeply` searches for the base valve anew beside the best.
+    """
     seen: dict[str, tuple[float, ...]] = {}
     # without the effect a valve may have found its lags far off
-    lags: Bases = grid([each for each in fitter.unknowns(group) if each.name in LAGS])
+    free = {each.name: each for each in fitter.unknowns(group)}
+    lags: Bases = grid([free[name] for name in LAGS if name in free])
     frictions: Bases = [{}]
     held = valve.values['f_s']
     shown: dict[str, Bases] = {}
@@ -70,6 +76,9 @@ def race(
         }
         held = friction_seen(fitter.bench, results)[0]
         frictions = friction_grid(held)
+        if 'f_d1' in free and valve.values['f_d1'] > valve.values['f_s']:
+            # a play of the converter may have made up for friction
+            frictions += [{**each, 'f_d1': START['f_d1']} for each in frictions]
         shown = {DWELL: dwell_seen(fitter.bench, results)}
     done = 0
 
@@ -133,16 +142,26 @@ def race(
             near = sum(excess(each) <= odds.CLEAN for each in runners[:REFINED])
             return followed(refined, runners, near or REFINED, ahead)
 
-        laborious = [each for each in candidates if CATALOGUE[each.effect].laborious]
-        runners = heat([], [each for each in candidates if each not in laborious])
+        slow = [each for each in candidates if _slow(each.effect)]
+        quick = [each for each in candidates if each not in slow]
+        runners = heat([], quick)
+        if deeply and runners:
+            runners = _deepened(fitter, group, valve, runners, quick, progress)
         best = runners[0] if runners else valve
         if excess(best) <= min(odds.CLEAN, NEARLY_ALL * excess(valve)):
             effect = best.candidates[-1].effect
-            laborious = [each for each in laborious if odds.look_alike(effect, each.effect)]
+            slow = [each for each in slow if odds.look_alike(effect, each.effect)]
         elif runners and excess(valve) < (odds.CLEAN if valve.candidates else FAINT):
-            laborious = []
-        runners = heat(runners, laborious)
+            slow = [each for each in slow if not CATALOGUE[each.effect].laborious]
+        runners = heat(runners, slow)
+        if deeply:
+            runners = _deepened(fitter, group, valve, runners, slow, progress)
     return alike(fitter, group, runners)
+
+
+def _slow(effect: str) -> bool:
+    """Tell whether a search for an effect takes many times as long as one for another."""
+    return CATALOGUE[effect].laborious or CATALOGUE[effect].rugged
 
 
 def alike(fitter: Fitter, group: Group, runners: Sequence[Valve]) -> list[Valve]:
@@ -192,14 +211,15 @@ def in_reach(valve: Valve, runners: Sequence[Valve]) -> list[Valve]:
     return [each for each in runners if each.cost <= best + BEHIND * (valve.cost - best)]
 
 
-def deepened(
+def _deepened(
     fitter: Fitter,
     group: Group,
     valve: Valve,
     runners: list[Valve],
+    candidates: Collection[Candidate],
     progress: Callable[[float], object],
 ) -> list[Valve]:
-    """Search for the base valve anew beside the best effects, if none explains the signal.
+    """Search for the base valve anew beside the best candidates, if none explains the signal.
 
     Not beside those whose runs take long: it would take minutes.
     """
@@ -214,7 +234,8 @@ def deepened(
     for each in in_reach(valve, odds.best_per_effect(runners)[:DEEPENED]):
         # far behind one that explains the signal, others need no deeper search
         hopeless = explains(best) and each.cost > best.cost / FAR_AHEAD
-        if hopeless or CATALOGUE[each.candidates[-1].effect].laborious:
+        added = each.candidates[-1]
+        if hopeless or added not in candidates or CATALOGUE[added.effect].laborious:
             continue
         progress(1.0)
         there = find_base(fitter, group, each, fitter.drive)
@@ -263,8 +284,13 @@ def _screened(
 
     levels = [level for level in (usual['f_s'], held) if level > 0.0]
 
+    def balanced(start: Mapping[str, float]) -> Bases:
+        each = [candidate.balanced(level, usual, start) for level in levels]
+        # held as before, the stem may slip as before or further
+        return [{**one, **share} for one in each for share in SHARES if one] or [{}]
+
     def around(bases: Bases) -> list[Bases]:
-        each = [[candidate.balanced(level, usual, start) for level in levels] for start in own]
+        each = [balanced(start) for start in own]
         return [
             [{**usual, **base, **start} for base in (*some, *bases)]
             for some, start in zip(each, own, strict=True)

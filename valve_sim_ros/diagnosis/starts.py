@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Where the searches for the base valve start."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from itertools import product
 
 from .unknowns import Unknown
@@ -34,12 +34,21 @@ STEMS = (
     {'a_1/a_2': 25.0, 'damping': 0.7},
 )
 """A stem that creeps to its place, and one that overshoots."""
+SHARES: tuple[dict[str, float], ...] = ({}, *({'f_d/f_s': share} for share in GRID['f_d/f_s']))
+"""Kinetic friction as found, and others."""
 SWEEP = tuple(
     {'a_1/a_2': rate, 'damping': damping}
     for rate in (10.0, 25.0, 60.0)
     for damping in (0.25, 0.5, 1.0, 3.0)
 )
 """Stems of all kinds: from one that swings into one that creeps, no fit leads."""
+NEARBY: dict[str, tuple[float, ...]] = {
+    'f_s': (0.8, 0.9, 1.0, 1.1, 1.2, 1.35, 1.6),
+    'f_d/f_s': (0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9),
+    'lags': (0.85, 0.92, 1.0, 1.08, 1.17),
+}
+"""Where a valve that slips lies from one that creeps and fits best: times its f_s and its lags,
+and shares of friction. The valley between them is long, narrow and bent."""
 AROUND = (0.9, 1.0)
 """Shares of the friction that the data show from which a search starts."""
 
@@ -49,6 +58,22 @@ def grid(unknowns: Sequence[Unknown]) -> list[dict[str, float]]:
     names = [unknown.name for unknown in unknowns if unknown.name in GRID]
     values = STEM_GRID if set(names) == set(STEM_GRID) else GRID
     return [dict(zip(names, point, strict=True)) for point in product(*(values[n] for n in names))]
+
+
+def nearby(values: Mapping[str, float]) -> list[dict[str, float]]:
+    """Return starts around a valve that fits x alone, of all kinds of stems and frictions."""
+    return [
+        {
+            **values,
+            **stem,
+            'f_s': f_s * values['f_s'],
+            'f_d/f_s': share,
+            'T_g1': lag * values['T_g1'],
+            'T_g2': lag * values['T_g2'],
+        }
+        for f_s, share, lag in product(*NEARBY.values())
+        for stem in SWEEP
+    ]
 
 
 def friction_grid(seen: float) -> list[dict[str, float]]:
