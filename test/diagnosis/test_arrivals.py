@@ -70,3 +70,15 @@ def test_a_lag_is_named_from_what_follows_steps_wherever_the_sample_is(period, s
     assert named.rung.effect == 'ip_lag'
     assert named.values['ip_lag.time_constant'] == pytest.approx(lag, rel=0.05)
     assert found.ladders[0].after.excess < 0.1
+
+
+def test_a_lag_before_the_play_is_told_from_one_behind_it():
+    rng = np.random.default_rng(5)
+    u = np.repeat(rng.uniform(10.0, 90.0, 40), 40)
+    lag = {'ip_lag.time_constant': 0.8, 'ip_lag.upstream': 1.0}
+    run = simulate(u, parameters={**VALVE, 'f_d1': 2.0, 'effects': ['ip_lag'], **lag})
+    found = diagnose([Recording(run.t, u, run.p1 + 0.2 * rng.standard_normal(u.size))])
+    (named,) = found.effects
+    assert named.rung.effect == 'ip_lag'
+    assert named.values['ip_lag.time_constant'] == pytest.approx(0.8, rel=0.03)
+    assert named.values['ip_lag.upstream'] == pytest.approx(1.0, abs=0.05)

@@ -167,8 +167,11 @@ def test_little_excess_behind_a_named_effect_is_no_reason_for_another(named, fou
 
 def test_what_an_effect_named_before_explains_is_not_unknown():
     unknown = ladder_of('unknown_effect', left(1.0), left(1.0))
-    assert excused(unknown, left(20.0)).outcome == 'adequate'
-    assert excused(unknown, left(2.0)).outcome == 'unknown_effect'
+    assert excused(unknown, left(20.0), 0.1).outcome == 'adequate'
+    assert excused(unknown, left(2.0), 0.1).outcome == 'unknown_effect'
+    # where the signals before are not explained themselves, what is no more than that says nothing
+    assert excused(unknown, left(20.0), 0.5).outcome == 'unknown_effect'
+    assert excused(unknown, left(2.0), 1.5).outcome == 'adequate'
 
 
 def test_a_first_effect_that_the_second_makes_needless_is_dropped():

@@ -9,11 +9,14 @@ import pytest
 from valves import recording, VALUES
 
 from valve_sim_ros.diagnosis import odds
+from valve_sim_ros.diagnosis.adequacy import but_one_slip, leftover
 from valve_sim_ros.diagnosis.base_valve import on_time
 from valve_sim_ros.diagnosis.bench import Bench
 from valve_sim_ros.diagnosis.fitting import Fitter, Valve
+from valve_sim_ros.diagnosis.proof import prove
 from valve_sim_ros.diagnosis.seen import dwell_seen
 from valve_sim_ros.diagnosis.stages import groups
+from valve_sim_ros.diagnosis.stretch import CAUGHT
 from valve_sim_ros.diagnosis.unknowns import complete
 from valve_sim_ros.recordings.recording import Recording
 
@@ -66,6 +69,27 @@ def test_what_slips_leave_that_hang_on_noise_is_no_gap():
     left = on_time(fitter, group, far)
     assert left.excess <= odds.SPOTLESS
     assert left.far < odds.MORE_FAR
+
+
+def test_one_slip_at_another_moment_is_no_gap_but_two_are():
+    noise = np.random.default_rng(4).standard_normal(3000)
+    noise[700:720] += 12.0
+    assert leftover(noise).far > odds.LEAST_FAR
+    one = leftover(but_one_slip(noise))
+    assert (one.far, one.excess) == (0, pytest.approx(0.0, abs=0.05))
+    noise[2000:2020] -= 12.0
+    assert leftover(but_one_slip(noise)).far > odds.LEAST_FAR
+    small = np.random.default_rng(4).standard_normal(3000)
+    assert but_one_slip(small) is small
+
+
+def test_a_caught_stem_shows_what_a_right_friction_closes():
+    fitter, group, valve = fitter_of()
+    wrong = replace(valve, values={**valve.values, 'f_s': 1.3 * VALUES['f_s']})
+    gaps = prove(fitter, [group], wrong, valve, dict.fromkeys(('p1', 'p2', 'x'), 1.0), (CAUGHT,))
+    assert gaps['x'].after.held_out < 1.5 * gaps['x'].noise
+    counted = [np.isfinite(each.counts['x']).sum() for each in fitter.bench.stretches]
+    assert sum(counted) > 0.8 * fitter.bench.size  # nothing is held out any more
 
 
 def test_friction_that_differs_by_direction_is_one():

@@ -29,8 +29,26 @@ def measured(samples=50, **effects):
     return Fitter(Bench([Recording(s.t, u, x=x)]))
 
 
+def ramp(start, end):
+    return np.linspace(start, end, 60)
+
+
 def candidates(*effects):
     return [each for each in ALL.candidates() if each.effect in effects]
+
+
+def test_a_base_valve_is_found_at_the_end_of_a_narrow_valley():
+    """A stem that creeps imitates one that slips: lags and friction change together in between."""
+    rng = np.random.default_rng(3)
+    ends = np.concatenate([[40.0], rng.uniform(10.0, 90.0, 12)])
+    u = np.concatenate([np.full(20, 40.0), *map(ramp, ends[:-1], ends[1:])])
+    valve = {'f_d1': 0.74, 'T_g1': 5.0, 'T_g2': 5.0, 'f_s': 4.57, 'f_d': 2.87}
+    s = simulate(u, 0.5, {**valve, 'a_1': 1530.0, 'a_2': 50.0})
+    record = Recording(s.t, u, x=s.x + 0.2 * rng.standard_normal(u.size))
+    fitter = Fitter(Bench([record]))
+    found = find_base(fitter, ALL, starting_valve(fitter.bench), ())
+    assert found.cost < u.size  # 2.0 for each sample where the stem creeps
+    assert found.values['T_g1'] == pytest.approx(5.0, rel=0.05)
 
 
 def test_a_rate_that_is_limited_one_way_is_found():

@@ -17,9 +17,9 @@ from .unknowns import EARLY, LATE, PHASE, Unknown
 
 FEW_STARTS = 3
 """So many starts are followed."""
-SWEPT, FOLLOWED, GENERATIONS, PATIENT = 4, 4, 30, 150
+SWEPT, FOLLOWED, GENERATIONS, PATIENT, TURNS = 4, 4, 30, 150, 3
 """So many base valves are tried with stems of all kinds; so many are followed by an evolution
-where costs are rugged, and for how long: longer along a narrow valley."""
+where costs are rugged, and for how long: longer along a narrow valley, so many times at most."""
 NEARLY = 0.95
 """Phase beyond which a command acts nearly a whole period late or early."""
 LAG, CLEARLY = 'ip_lag', 50.0
@@ -91,20 +91,33 @@ def find_base(
     found.sort(key=by_cost)
     best = fitter.fit(found[0], problem)
     left = leftover(fitter.residuals(best, group.signal, drive))
-    if not (closely or odds.suspicious(left, group, fitter.bench.mixed)):
+    smeared = len(group.stages) > 1 and left.mean_square > odds.COLOURED  # no window is quiet
+    if not (closely or smeared or odds.suspicious(left, group, fitter.bench.mixed)):
         return best
     # caught where it is far from its rest, a stem that slips too late is only a little wrong
     way = eased(problem)[0]
     eases = found if way == problem else followed(way)
     rested = [fitter.evolve(each, way, GENERATIONS, NARROW) for each in eases]
-    if len(group.stages) > 1:  # lags make up for friction
-        kinds = _apart(nearby(best.values), 'f_d/f_s')
-        tried = sorted((fitter.scan(best, some, way)[0] for some in kinds), key=by_cost)
-        rested += [fitter.evolve(each, way, PATIENT, FINE) for each in tried[:FEW_STARTS]]
+    if len(group.stages) > 1:
+        rested += _along_the_valley(fitter, best, way)
     found += [fitter.fit(each, problem) for each in rested]
     found = sorted(found, key=by_cost)[:FOLLOWED]
     found += [fitter.evolve(each, problem, GENERATIONS, NARROW) for each in found]
     return fitter.refined(min(found, key=by_cost), problem)
+
+
+def _along_the_valley(fitter: Fitter, valve: Valve, way: Problem) -> list[Valve]:
+    """Return valves with other frictions, for which their lags make up."""
+    _, signal, drive = way
+    found: list[Valve] = []
+    for _ in range(TURNS):
+        kinds = _apart(nearby(valve.values), 'f_d/f_s')
+        tried = sorted((fitter.scan(valve, some, way)[0] for some in kinds), key=by_cost)
+        found += [fitter.evolve(each, way, PATIENT, FINE) for each in tried[:FEW_STARTS]]
+        valve = min(found, key=by_cost)
+        if leftover(fitter.residuals(valve, signal, drive)).excess <= odds.SPOTLESS:
+            break
+    return found
 
 
 def on_time(fitter: Fitter, group: Group, valve: Valve) -> Leftover:

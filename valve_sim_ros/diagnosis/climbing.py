@@ -68,9 +68,9 @@ def climb_all(
         )
         fitter.drive = drive
         ladder = concluded(ladder)
-        if added and carried <= odds.CLEAN:
+        if added:
             plain = leftover(fitter.residuals(base, group.signal, ()))
-            ladder = excused(ladder, plain)
+            ladder = excused(ladder, plain, carried)
         if group.has_stem and ladder.complete:
             again = partial(
                 climb,

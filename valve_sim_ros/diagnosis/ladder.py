@@ -168,7 +168,9 @@ def climb(
             if rungs:
                 both = reconsidered(fitter, group, base, [*rungs, rung], lightly=again)
                 names = [each.effect for each in both]
-                if not odds.needed(base_left, before, rung.closed, both[-1].after, names):
+                # one that does is the first, found better, or the second alone
+                needed = odds.needed(base_left, before, rung.closed, both[-1].after, names)
+                if len(both) > 1 and not needed:
                     guess = guess or rung
                     break
                 rungs, rung = both[:-1], both[-1]
@@ -278,12 +280,14 @@ def concluded(ladder: Ladder) -> Ladder:
     return replace(ladder, outcome=outcome, valve=ladder.base, after=ladder.before, rungs=())
 
 
-def excused(ladder: Ladder, plain: Leftover) -> Ladder:
+def excused(ladder: Ladder, plain: Leftover, carried: float) -> Ladder:
     """Return the ladder of a group behind one with an effect, not unknown if that explains most.
 
-    Its law is never quite right, and slips tell. `plain` is what the valve without it leaves.
+    Its law is never quite right, and slips tell; nor is it unknown if no more is left than the
+    `carried` excess of the signals before. `plain` is what the valve without it leaves.
     """
-    explained = plain.closed_by(ladder.before) >= odds.MOSTLY
-    if ladder.outcome == 'unknown_effect' and explained:
+    explained = carried <= odds.CLEAN and plain.closed_by(ladder.before) >= odds.MOSTLY
+    carried_on = carried > odds.CLEAN and ladder.before.excess <= carried
+    if ladder.outcome == 'unknown_effect' and (explained or carried_on):
         return replace(ladder, outcome='adequate')
     return ladder
