@@ -243,8 +243,12 @@ def sensor_quantisation(rng: Rng, valve: Physics, length: float) -> Changes:
 
 
 def sensor_drift(rng: Rng, valve: Physics, length: float) -> Changes:
-    """Let the sensor's zero drift by this much over the record."""
-    return {'sensor_drift': either_sign(rng, 1.0, 10.0) / length}
+    """Let the sensor's zero drift by this much over the record, or settle while it warms up."""
+    total = either_sign(rng, 1.0, 10.0)
+    if rng.random() < 0.7:
+        return {'sensor_drift': total / length}
+    warm_up = rng.uniform(0.15, 0.4) * length
+    return {'sensor_drift': total / warm_up, 'sensor_warm_up': warm_up}
 
 
 EFFECTS: dict[str, Callable[[Rng, Physics, float], Changes]] = {

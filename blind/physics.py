@@ -90,6 +90,7 @@ class Physics(NamedTuple):
     sensor_span: float = 1.0
     sensor_step: float = 0.0
     sensor_drift: float = 0.0
+    sensor_warm_up: float = 0.0
     # effects that no catalogue lists
     relaxation: float = 0.0
     relaxation_time: float = 20.0

@@ -135,6 +135,11 @@ OTHER_FORMS = [
         {'dwell_gain': 0.8, 'dwell_time': 10.0, 'dwell_rational': 1.0},
         {'growth': 0.8, 'time_constant': 10.0, 'shape': 1.0},
     ),
+    (
+        'sensor_drift',
+        {'sensor_drift': 0.05, 'sensor_warm_up': 60.0},
+        {'rate': 180.0, 'settling': 60.0},
+    ),
     ('air_leak', {'leak': 0.02, 'leak_orifice': 1.0}, {'leak_rate': 0.02, 'exponent': 0.5}),
 ]
 
