@@ -18,7 +18,8 @@ FAR = 4.5
 QUIET = 0.3
 """The quietest share of the windows shows the noise."""
 ONE_SLIP = 0.01
-"""The share of a record in which a single slip is over, and the stem where it should be."""
+"""The share of a record (one to three windows) in which a single slip is over, and the stem where
+it should be."""
 LOWEST, HIGHEST = 0.3, 8.0
 """What may be noise [that seen from sample to sample]: a swinging model leaves no quiet window."""
 
@@ -81,7 +82,7 @@ def but_one_slip(residual: Array) -> Array:
     far = np.flatnonzero(np.abs(residual) > FAR * leftover(residual).floor ** 0.5)
     if not far.size:
         return residual
-    ends = far + max(int(ONE_SLIP * residual.size), WINDOW)
+    ends = far + int(np.clip(ONE_SLIP * residual.size, WINDOW, 3 * WINDOW))
     worst = np.argmax(np.searchsorted(far, ends) - np.arange(far.size))
     rest = residual.copy()
     rest[far[worst] - 1 : ends[worst]] = np.nan
