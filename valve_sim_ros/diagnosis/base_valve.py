@@ -20,6 +20,8 @@ FEW_STARTS = 3
 SWEPT, FOLLOWED, GENERATIONS, PATIENT, TURNS = 4, 4, 30, 150, 3
 """So many base valves are tried with stems of all kinds; so many are followed by an evolution
 where costs are rugged, and for how long: longer along a narrow valley, so many times at most."""
+HARDLY = 0.95
+"""Share of the cost that is left where another turn is not worth its time."""
 NEARLY = 0.95
 """Phase beyond which a command acts nearly a whole period late or early."""
 LAG, CLEARLY = 'ip_lag', 50.0
@@ -110,13 +112,16 @@ def _along_the_valley(fitter: Fitter, valve: Valve, way: Problem) -> list[Valve]
     """Return valves with other frictions, for which their lags make up."""
     _, signal, drive = way
     found: list[Valve] = []
+    valve = replace(valve, cost=fitter.score(valve, signal, drive))
     for _ in range(TURNS):
         kinds = _apart(nearby(valve.values), 'f_d/f_s')
         tried = sorted((fitter.scan(valve, some, way)[0] for some in kinds), key=by_cost)
         found += [fitter.evolve(each, way, PATIENT, FINE) for each in tried[:FEW_STARTS]]
-        valve = min(found, key=by_cost)
-        if leftover(fitter.residuals(valve, signal, drive)).excess <= odds.SPOTLESS:
+        better = min(found, key=by_cost)
+        left = leftover(fitter.residuals(better, signal, drive))
+        if left.excess <= odds.SPOTLESS or better.cost > HARDLY * valve.cost:
             break
+        valve = better
     return found
 
 
