@@ -235,3 +235,15 @@ def test_a_sample_is_as_good_as_many_short_ones(effect):
 @pytest.mark.parametrize('other', ['presliding', 'stribeck_friction', 'friction_asymmetry'])
 def test_so_it_is_where_the_moving_stem_acts_on_the_chamber(other):
     assert max(share_apart(['chamber_volume', other]).values()) < 0.02
+
+
+@pytest.mark.parametrize('command', [-100.0, -60.0, 0.0])
+@pytest.mark.parametrize('p2', [-80.0, -60.0])
+def test_an_orifice_knows_no_less_than_a_vacuum(p2, command):
+    orifice = {'exponent': 1.0, 'critical_ratio': 0.3, 'absolute_pressure': 60.0}
+    values = {f'nonlinear_flow.{name}': value for name, value in orifice.items()}
+    spec = ValveSpec().changed({'effects': ['nonlinear_flow'], **values})
+    s = simulate(np.full(50, command), parameters=spec, initial=InitialState(command, p2, 0.0))
+    assert np.isfinite(s.p2).all()
+    towards = np.sign(command - p2) * np.diff(s.p2)
+    assert (towards >= -1e-4).all()

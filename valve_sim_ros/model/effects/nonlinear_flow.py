@@ -27,8 +27,9 @@ def flow(value: Any, state: Any, p: Any, memory: Any, dt: float) -> tuple[float,
         down = MIDDLE + absolute
         up = down + REFERENCE
         speed = rate * REFERENCE / (up * math.cos(angle(down / up, critical)))
-        end = orifice(state.p2 + absolute, target + absolute, critical, speed, dt)
-        end = abs(end - target - absolute) / REFERENCE
+        # a search may ask for less than a vacuum
+        inside, outside = max(state.p2 + absolute, LEAST), max(target + absolute, LEAST)
+        end = abs(orifice(inside, outside, critical, speed, dt) - outside) / REFERENCE
     elif abs(exponent - 1.0) >= 1e-9:
         # D' = -(D_0 / T_g) (D / D_0)^n
         power = share ** (1.0 - exponent) - (1.0 - exponent) * rate * dt
