@@ -79,6 +79,10 @@ def test_one_slip_at_another_moment_is_no_gap_but_two_are():
     assert (one.far, one.excess) == (0, pytest.approx(0.0, abs=0.05))
     noise[2000:2020] -= 12.0
     assert leftover(but_one_slip(noise)).far > odds.LEAST_FAR
+    noise[700:720] -= 12.0
+    noise[2000:2020] += 12.0
+    noise[:20] += 12.0  # where the record begins, too
+    assert leftover(but_one_slip(noise)).far == 0
     small = np.random.default_rng(4).standard_normal(3000)
     assert but_one_slip(small) is small
 

@@ -85,7 +85,7 @@ def but_one_slip(residual: Array) -> Array:
     ends = far + int(np.clip(ONE_SLIP * residual.size, WINDOW, 3 * WINDOW))
     worst = np.argmax(np.searchsorted(far, ends) - np.arange(far.size))
     rest = residual.copy()
-    rest[far[worst] - 1 : ends[worst]] = np.nan
+    rest[max(far[worst] - 1, 0) : ends[worst]] = np.nan
     return rest
 
 

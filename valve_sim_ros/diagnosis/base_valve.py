@@ -9,7 +9,7 @@ from . import odds
 from .adequacy import Leftover, leftover
 from .arrivals import put_in_its_period
 from .bench import Bench, MIXED_JITTER
-from .fitting import by_cost, eased, FINE, Fitter, NARROW, Problem, SHORT, Valve
+from .fitting import by_cost, eased, FINE, Fitter, NARROW, PATIENT, Problem, SHORT, Valve
 from .seen import friction_seen, mixed_arrivals
 from .stages import Group
 from .starts import friction_grid, grid, nearby, START, STEMS, SWEEP
@@ -17,9 +17,9 @@ from .unknowns import EARLY, LATE, PHASE, Unknown
 
 FEW_STARTS = 3
 """So many starts are followed."""
-SWEPT, FOLLOWED, GENERATIONS, PATIENT, TURNS = 4, 4, 30, 150, 3
+SWEPT, FOLLOWED, GENERATIONS, TURNS = 4, 4, 30, 3
 """So many base valves are tried with stems of all kinds; so many are followed by an evolution
-where costs are rugged, and for how long: longer along a narrow valley, so many times at most."""
+where costs are rugged, and for how long; and most turns along a narrow valley."""
 HARDLY = 0.95
 """Share of the cost that is left where another turn is not worth its time."""
 NEARLY = 0.95

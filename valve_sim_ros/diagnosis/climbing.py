@@ -10,9 +10,9 @@ from functools import partial
 from ..identification.watch import Progress, Stop
 from . import dead_time, odds
 from .adequacy import leftover
-from .base_valve import find_base, PATIENT
+from .base_valve import find_base
 from .coarse import rounded
-from .fitting import by_cost, FINE, Fitter, GENERATIONS, NARROW, Valve
+from .fitting import by_cost, FINE, Fitter, GENERATIONS, NARROW, PATIENT, Valve
 from .ladder import climb, concluded, excused, Ladder
 from .rung import Rung
 from .stages import Group
@@ -115,7 +115,7 @@ def _second_look(fitter: Fitter, ladder: Ladder, again: Callable[[], Ladder]) ->
     for how in (CAUGHT, RESTS):
         fitter.drive = (*drive, how)
         found = concluded(again())
-        if found.outcome != 'missing_effect' and found.best_guess:
+        if found.complete and found.outcome != 'missing_effect' and found.best_guess:
             found = _patiently(fitter, found, found.best_guess)
         fitter.drive = drive
         complete = complete and found.complete

@@ -28,8 +28,9 @@ hangs on every step [steps of unknowns]."""
 POPULATION = 14
 FAINT = 0.02
 """Excess up to which a train of slips is right; laborious effects leave more in a base valve."""
-GENERATIONS, MOST_TURNS = 40, 3
-"""Generations of an evolution that refines a valve, and most evolutions in turn."""
+GENERATIONS, PATIENT, MOST_TURNS = 40, 150, 3
+"""Generations of an evolution that refines a valve, and of one along a narrow valley; and most
+evolutions in turn."""
 
 
 @dataclass(frozen=True)

@@ -130,6 +130,18 @@ class EffectParameter(Parameter):
         self.checked(self.neutral)
 
 
+def upstream(start: float) -> EffectParameter:
+    """Return the parameter that says on which side of the play a fault of the converter acts.
+
+    Parameters
+    ----------
+    start : float
+        Where a search starts.
+    """
+    text = 'Share of it before the backlash'
+    return EffectParameter('upstream', 'w', '-', 0.0, 0.0, 1.0, 'linear', text, starts=(start,))
+
+
 @dataclass(frozen=True)
 class Effect:
     """A physical effect that the base valve lacks.

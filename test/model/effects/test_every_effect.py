@@ -17,7 +17,9 @@ from valve_sim_ros import (
     write_parameters,
 )
 from valve_sim_ros.model.effects import CATALOGUE
+from valve_sim_ros.model.effects.nonlinear_flow import flow
 from valve_sim_ros.model.kernels import SLOTS
+from valve_sim_ros.model.state import State
 
 PUBLIC = """
 ip_dead_time ip_lag ip_calibration ip_nonlinearity supply_limit positioner_loop tubing_dead_time
@@ -247,3 +249,8 @@ def test_an_orifice_knows_no_less_than_a_vacuum(p2, command):
     assert np.isfinite(s.p2).all()
     towards = np.sign(command - p2) * np.diff(s.p2)
     assert (towards >= -1e-4).all()
+
+
+def test_an_orifice_lets_a_run_that_blew_up_go_on():
+    start = State(*[0.0] * len(State._fields))._replace(p2=np.inf)
+    assert flow((0.0, 0.1), start, (1.0, 0.3, 60.0), (), 0.2) == (0.0, 0.1)

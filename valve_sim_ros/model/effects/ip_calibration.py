@@ -6,7 +6,7 @@ from typing import Any
 
 from numba import njit
 
-from ..declarations import Effect, EffectParameter
+from ..declarations import Effect, EffectParameter, upstream
 
 
 @njit
@@ -54,17 +54,7 @@ EFFECT = Effect(
             usual=(0.008, 0.13),
             shown='spans',
         ),
-        EffectParameter(
-            'upstream',
-            'w',
-            '-',
-            0.0,
-            0.0,
-            1.0,
-            'linear',
-            'Share of it before the backlash',
-            starts=(0.5,),
-        ),
+        upstream(0.5),
     ),
     variants=(('zero', 'span', 'upstream'),),
     slots={'command_slot': command, 'inlet_slot': inlet},

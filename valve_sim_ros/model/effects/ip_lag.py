@@ -7,7 +7,7 @@ from typing import Any
 
 from numba import njit
 
-from ..declarations import Effect, EffectParameter
+from ..declarations import Effect, EffectParameter, upstream
 from ..memory import lagged
 
 
@@ -61,17 +61,7 @@ EFFECT = Effect(
             'Time constant of p1 after u',
             starts=(0.2, 0.7, 2.0),
         ),
-        EffectParameter(
-            'upstream',
-            'w',
-            '-',
-            0.0,
-            0.0,
-            1.0,
-            'linear',
-            'Share of it before the backlash',
-            starts=(1.0,),
-        ),
+        upstream(1.0),
     ),
     variants=(('time_constant',), ('time_constant', 'upstream')),
     slots={'command_slot': command, 'inlet_slot': inlet, 'tubing_slot': tubing},

@@ -7,7 +7,7 @@ from typing import Any
 
 from numba import njit
 
-from ..declarations import Effect, EffectParameter
+from ..declarations import Effect, EffectParameter, upstream
 
 
 @njit
@@ -47,17 +47,7 @@ EFFECT = Effect(
             'Deviation of p1 at mid span',
             starts=(-8.0, -2.0, 2.0, 8.0),
         ),
-        EffectParameter(
-            'upstream',
-            'w',
-            '-',
-            0.0,
-            0.0,
-            1.0,
-            'linear',
-            'Share of it before the backlash',
-            starts=(0.5,),
-        ),
+        upstream(0.5),
         EffectParameter(
             'exponent',
             'n',

@@ -21,7 +21,7 @@ def flow(value: Any, state: Any, p: Any, memory: Any, dt: float) -> tuple[float,
     target, rate = value
     exponent, critical, absolute = p
     share = abs(state.p2 - target) / REFERENCE
-    if dt <= 0.0 or share < LEAST:
+    if dt <= 0.0 or share < LEAST or share == math.inf:  # nothing flows, or a run that blew up
         return target, rate
     if critical > 0.0:
         down = MIDDLE + absolute
