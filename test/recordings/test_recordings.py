@@ -136,10 +136,19 @@ def test_nan_in_a_bag_is_refused(recording, tmp_path):
         refuse_not_finite('x', spoilt, recording.time)
 
 
+@pytest.mark.parametrize('clock', ['t', 'time', '__time', 'time [s]'])
+def test_the_column_of_times_may_be_called_so(tmp_path, clock):
+    (tmp_path / 'own.csv').write_text(f'u,x,{clock}\n10,11,100\n20,21,100.5\n')
+    found = read_recording(tmp_path / 'own.csv')
+    np.testing.assert_array_equal(found.time, [0.0, 0.5])
+    assert found.provenance.time_source == f'column {clock.split()[0]}'
+
+
 @pytest.mark.parametrize(
     ('text', 'words'),
     [
         ('', 'empty'),
+        ('u,x\n0,1\n', "no column 't'"),
         ('t,u,x\n', 'without samples'),
         ('t,x\n0,1\n', "no column 'u'"),
         ('t,u,x\n0,1,2\n1,a,2\n', 'line 3'),

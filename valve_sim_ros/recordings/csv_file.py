@@ -1,6 +1,6 @@
 # Copyright 2026 The valve_sim_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Recordings as CSV: a header with t, u and any of p1, p2, x, comment lines after #."""
+"""Recordings as CSV: a header with t (or time), u and any of p1, p2, x, comment lines after #."""
 
 import csv
 from dataclasses import replace
@@ -16,11 +16,14 @@ from .quality import Array
 from .recording import Provenance, Recording, refuse_not_finite, SIGNALS
 from .topics import chosen, Topics
 
+TIMES = ('t', 'time', '__time')
+"""What the column of times may be called: by `write_csv`, by hand, by PlotJuggler."""
+
 
 def read_csv(path: str | os.PathLike[str], topics: Topics | None = None) -> Recording:
     """Read a CSV file with columns t [s], u and any of p1, p2, x [% of span], in any order.
 
-    An empty cell is a lost sample; the command before a lost one holds. `topics` renames columns.
+    The times may also stand in a column `time` or `__time`. An empty cell is a lost sample; the command before a lost one holds. `topics` renames columns.
 
     Raises
     ------
@@ -45,7 +48,8 @@ def read_csv(path: str | os.PathLike[str], topics: Topics | None = None) -> Reco
     signals: dict[str, Any] = {}
     for name, (index, scale, offset) in columns.items():
         signals[name] = table[:, index] * scale + offset
-    time = table[:, header.index('t')]
+    clock = next(name for name in TIMES if name in header)
+    time = table[:, header.index(clock)]
     try:
         refuse_not_finite('t', time, np.arange(time.size, dtype=float))
         for name, values in signals.items():
@@ -64,7 +68,7 @@ def read_csv(path: str | os.PathLike[str], topics: Topics | None = None) -> Reco
                 paths=(str(path),),
                 digests={str(path): hashlib.sha256(content).hexdigest()},
                 topics={name: header[index] for name, (index, _, _) in columns.items()},
-                time_source='column t',
+                time_source=f'column {clock}',
                 storage='csv',
                 comments=comments,
             ),
@@ -99,7 +103,8 @@ def _columns(
         for name in SIGNALS
     }
     missing = [names[s] for s in selections if names[s] not in header]
-    missing += [name for name in ('t', names['u']) if name not in header]
+    missing += ['t'] if {*TIMES}.isdisjoint(header) else []
+    missing += [names['u']] if names['u'] not in header else []
     if missing:
         raise RecordingError(
             f'{path}: no column {missing[0]!r}; it has {", ".join(header)}; expected t, u and any '
