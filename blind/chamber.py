@@ -39,12 +39,15 @@ def drive(p_in, p2, q):
 
 
 @numba.njit
-def exhaust_factor(excess, q):
+def exhaust_factor(excess, s, q):
     """Return by how much the rate is multiplied at this excess p2 - p1 over the inlet."""
     if q.exhaust_soft > 0.0:
         opening = min(max((excess - q.exhaust_threshold) / q.exhaust_soft, 0.0), 1.0)
         return 1.0 + (q.exhaust_gain - 1.0) * opening
-    return q.exhaust_gain if excess > q.exhaust_threshold else 1.0
+    # once open it may stay so down to a lower excess
+    share = q.exhaust_reseat if s[at.EXHAUST] == 1.0 else 1.0
+    s[at.EXHAUST] = 1.0 if excess > share * q.exhaust_threshold else 0.0
+    return q.exhaust_gain if s[at.EXHAUST] == 1.0 else 1.0
 
 
 @numba.njit
@@ -65,7 +68,7 @@ def chamber(p_in, s, q, h, t):
         constant *= 1.0 + q.warming * (1.0 - cos(q.warming_omega * max(t, 0.0)))
     room = 1.0 + q.volume * 0.01 * s[at.X]
     rate = drive(p_in, p2, q) / (constant * room) * (1.0 - 0.5 * h / constant)
-    rate = rate * exhaust_factor(p2 - p_in, q) - leaking(p2, q) / room
+    rate = rate * exhaust_factor(p2 - p_in, s, q) - leaking(p2, q) / room
     if q.volume_absolute >= 0.0:
         rate -= (p2 + q.volume_absolute) * q.volume * 0.01 * s[at.V] / room
     rate = min(max(rate, -q.p2_rate_down), q.p2_rate_up)

@@ -65,6 +65,8 @@ def positioner_loop(rng: Rng, valve: Physics, length: float) -> Changes:
     if rng.random() < 0.4 or 'loop_reset' in changes:
         changes['loop_low'] = -float(rng.choice((0.0, 5.0, 20.0)))
         changes['loop_high'] = 100.0 + float(rng.choice((0.0, 5.0, 30.0)))
+    if 'loop_reset' in changes and rng.random() < 0.4:
+        changes['loop_windup'] = rng.uniform(10.0, 40.0)
     return changes
 
 
@@ -107,6 +109,8 @@ def quick_exhaust(rng: Rng, valve: Physics, length: float) -> Changes:
     }
     if rng.random() < 0.25:
         changes['exhaust_soft'] = rng.uniform(0.5, 2.0)
+    elif rng.random() < 0.3:
+        changes['exhaust_reseat'] = rng.uniform(0.3, 0.8)
     return changes
 
 
@@ -128,6 +132,7 @@ def hysteresis(rng: Rng, valve: Physics, length: float) -> Changes:
         'hysteresis_at': 2.0 if place < 0.2 and kind == 2.0 else float(place < 0.4),
         'hysteresis_size': size,
         'hysteresis_width': size * rng.uniform(1.0, 2.5),
+        'hysteresis_direct': max(rng.uniform(-0.4, 0.4), 0.0),
     }
 
 

@@ -46,7 +46,8 @@ def remembered(target, s, q):
 def hysteresis(target, s, q):
     """Return the signal behind the distributed hysteresis."""
     if q.hysteresis_kind == 1.0:
-        return plays(target, s, q)
+        behind = plays(target, s, q)
+        return behind + q.hysteresis_direct * (target - behind)
     return target - q.hysteresis_size * remembered(target, s, q)
 
 
@@ -73,8 +74,11 @@ def positioner(u, s, q, h):
         return u
     error = u - s[at.XM]
     out = u + q.loop_gain * (error + s[at.LOOP])
-    if q.loop_low < out < q.loop_high:
+    if q.loop_windup > 0.0 or q.loop_low < out < q.loop_high:
         s[at.LOOP] += h * q.loop_reset * error
+    if q.loop_windup > 0.0:
+        most = q.loop_windup / q.loop_gain
+        s[at.LOOP] = min(max(s[at.LOOP], -most), most)
     return min(max(out, q.loop_low), q.loop_high)
 
 

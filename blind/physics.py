@@ -32,12 +32,14 @@ class Physics(NamedTuple):
     loop_reset: float = 0.0
     loop_low: float = -FAR
     loop_high: float = FAR
-    # distributed hysteresis: 1 weighted plays, 2 Bouc-Wen; of the transducer (0), of x
-    # (1), or Bouc-Wen of the force on the stem (2)
+    loop_windup: float = 0.0
+    # distributed hysteresis: 1 plays beside a direct share, 2 Bouc-Wen; of the transducer (0), of
+    # x (1), or Bouc-Wen of the force on the stem (2)
     hysteresis_kind: float = 0.0
     hysteresis_at: float = 0.0
     hysteresis_size: float = 0.0
     hysteresis_width: float = 1.0
+    hysteresis_direct: float = 0.0
     # inlet to chamber pressure
     tube_delay: float = 0.0
     leak: float = 0.0
@@ -51,6 +53,7 @@ class Physics(NamedTuple):
     exhaust_gain: float = 1.0
     exhaust_threshold: float = FAR
     exhaust_soft: float = 0.0
+    exhaust_reseat: float = 1.0
     p2_rate_up: float = FAR
     p2_rate_down: float = FAR
     # friction

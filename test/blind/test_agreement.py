@@ -102,6 +102,16 @@ OTHER_FORMS = [
     ),
     (
         'hysteresis',
+        {
+            'hysteresis_kind': 1.0,
+            'hysteresis_at': 1.0,
+            'hysteresis_size': 2.0,
+            'hysteresis_direct': 0.3,
+        },
+        {'inlet_width': 0.0, 'stem_width': 2.0 * 5 / 3, 'direct': 0.3},
+    ),
+    (
+        'hysteresis',
         {'hysteresis_kind': 2.0, 'hysteresis_size': 3.0, 'hysteresis_width': 5.4},
         {'inlet_width': 0.0, 'command_width': 3.0, 'reach': 1.8},
     ),
@@ -124,6 +134,28 @@ OTHER_FORMS = [
             'hysteresis_width': 6.0,
         },
         {'inlet_width': 0.0, 'force_width': 4.0, 'reach': 1.5},
+    ),
+    (
+        'quick_exhaust',
+        {'exhaust_gain': 4.0, 'exhaust_threshold': 8.0, 'exhaust_reseat': 0.5},
+        {'factor': 4.0, 'threshold': 8.0, 'reseat': 0.5},
+    ),
+    (
+        'positioner_loop',
+        {
+            'loop_gain': 1.5,
+            'loop_reset': 0.2,
+            'loop_low': 0.0,
+            'loop_high': 110.0,
+            'loop_windup': 30.0,
+        },
+        {
+            'gain': 1.5,
+            'integral_gain': 0.3,
+            'overdrive': 10.0,
+            'underdrive': 0.0,
+            'integral_limit': 30.0,
+        },
     ),
     (
         'positioner_loop',

@@ -171,6 +171,8 @@ def test_what_an_effect_named_before_explains_is_not_unknown():
     assert excused(unknown, left(2.0), 0.1).outcome == 'unknown_effect'
     # where the signals before are not explained themselves, what is no more than that says nothing
     assert excused(unknown, left(20.0), 0.5).outcome == 'unknown_effect'
+    assert excused(unknown, left(20.0), 0.5, sure=True).outcome == 'adequate'
+    assert excused(unknown, left(2.0), 0.5, sure=True).outcome == 'unknown_effect'
     assert excused(unknown, left(2.0), 1.5).outcome == 'adequate'
 
 

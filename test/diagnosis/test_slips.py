@@ -14,10 +14,11 @@ from valve_sim_ros.diagnosis.base_valve import on_time
 from valve_sim_ros.diagnosis.bench import Bench
 from valve_sim_ros.diagnosis.fitting import Fitter, Valve
 from valve_sim_ros.diagnosis.proof import prove
-from valve_sim_ros.diagnosis.seen import dwell_seen
+from valve_sim_ros.diagnosis.seen import dwell_seen, shaken_seen
 from valve_sim_ros.diagnosis.stages import groups
 from valve_sim_ros.diagnosis.stretch import CAUGHT
 from valve_sim_ros.diagnosis.unknowns import complete
+from valve_sim_ros.recordings.quality import roughness
 from valve_sim_ros.recordings.recording import Recording
 
 STARTING = {'p1_0': 0.0, 'p2_0': 0.0, 'x_0': 0.0}
@@ -54,6 +55,39 @@ def test_rests_of_all_lengths_show_how_friction_grows():
     dwell = [each for each in group.candidates() if each.effect == 'dwell_friction']
     suited = [each.suited(dwell_seen(fitter.bench, fitter.results(valve))) for each in dwell]
     assert [len(each) for each in suited] == [1, 2]
+
+
+SHAKES = {'vibration.amplitude': 0.6, 'vibration.frequency': 0.51, 'vibration.phase': 1.0}
+
+
+def shaken(effects, **values):
+    """Return the bench of a valve that creeps up and down by small slips behind a slow chamber."""
+    rng = np.random.default_rng(5)
+    u = np.repeat(30.0 + 30.0 * rng.random(60), 100)
+    there = {**VALUES, 'T_g1': 6.0, 'T_g2': 8.0, **dict.fromkeys(STARTING, 40.0), **values}
+    bench = Bench([Recording(0.2 * np.arange(u.size), u, p1=u)])
+    (truth,) = bench.run(complete(there), effects)
+    noisy = truth[:3] + 0.2 * rng.standard_normal((3, u.size))
+    return Bench([Recording(0.2 * np.arange(u.size), u, *noisy)])
+
+
+def test_the_moments_of_slips_show_what_shakes_the_stem():
+    held = VALUES['f_s']
+    assert shaken_seen(shaken(()), held) == []
+    starts = shaken_seen(shaken(('vibration',), **SHAKES), held)
+    assert starts
+    for start in starts:
+        assert start['vibration.frequency'] == pytest.approx(0.51, abs=3e-4)
+        assert start['vibration.phase'] == pytest.approx(1.0, abs=0.8)
+        assert start['f_s'] > held
+
+
+def test_a_swing_at_every_sample_is_no_noise():
+    large = {**SHAKES, 'vibration.amplitude': 4.0, 'vibration.frequency': 0.75}
+    swinging = shaken(('vibration',), f_s=2.5, **large)
+    noise = swinging.noise
+    assert roughness([swinging.stretches[0].measured['x']]) > 3.0 * noise['p2']
+    assert noise['x'] < 2.0 * noise['p2'] == pytest.approx(0.4, rel=0.1)
 
 
 def test_a_play_holds_the_stem_with_less_friction():

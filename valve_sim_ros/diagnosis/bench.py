@@ -18,6 +18,7 @@ from ..recordings.recording import OUTPUTS, Recording
 from .adequacy import LOWEST
 from .errors import DiagnosisError
 from .readings import (
+    between_lines,
     bridged,
     coarse_step,
     filled,
@@ -54,6 +55,10 @@ CREEPS = 3.0
 """A stem that drifts by more before it has surely moved moves when the record begins [noise]."""
 APART = 6.0
 """A stem is caught where it is further than this from where it should rest [noise]."""
+
+SWINGS = 0.7
+"""What a signal does from sample to sample is a swing if there is less between the lines of its
+spectrum than this part of it."""
 
 
 class Bench:
@@ -224,8 +229,10 @@ class Bench:
     def _noise_of(self, parts: Sequence[Array]) -> float:
         """Return the noise of a signal, steps of its resolution included."""
         step = resolution_of(np.concatenate(parts))
+        seen, between = noise_of(parts), between_lines(parts)
+        seen = between if between < SWINGS * seen else seen
         # as in `forgive_steps`: hardly any noise may be seen from sample to sample
-        return max(noise_of(parts), step / math.sqrt(12.0 * LOWEST))
+        return max(seen, step / math.sqrt(12.0 * LOWEST))
 
     def _uncertainty(self, name: str, values: Array) -> Array:
         """Return the noise of each sample, more where the signal moves: sample times jitter."""

@@ -70,7 +70,12 @@ def climb_all(
         ladder = concluded(ladder)
         if added:
             plain = leftover(fitter.residuals(base, group.signal, ()))
-            ladder = excused(ladder, plain, carried)
+            sure = all(
+                each.before.closed_by(each.after) >= odds.EXPLAINED_BUT_FAR
+                for each in ladders
+                if each.rungs
+            )
+            ladder = excused(ladder, plain, carried, sure=sure)
         if group.has_stem and ladder.complete:
             again = partial(
                 climb,

@@ -242,6 +242,9 @@ def reconsidered(
         found = judged(fitter, group, base, first.before, runners)
         return [found] if found else []
 
+    earlier = alone(second.valve, first.valve.candidates[-1], added)
+    if only := enough(second, earlier):
+        return only
     later = alone(second.valve, added, first.valve.candidates[-1])
     if only := enough(second, later):
         return only
@@ -280,13 +283,14 @@ def concluded(ladder: Ladder) -> Ladder:
     return replace(ladder, outcome=outcome, valve=ladder.base, after=ladder.before, rungs=())
 
 
-def excused(ladder: Ladder, plain: Leftover, carried: float) -> Ladder:
+def excused(ladder: Ladder, plain: Leftover, carried: float, *, sure: bool = False) -> Ladder:
     """Return the ladder of a group behind one with an effect, not unknown if that explains most.
 
     Its law is never quite right, and slips tell; nor is it unknown if no more is left than the
-    `carried` excess of the signals before. `plain` is what the valve without it leaves.
+    `carried` excess of the signals before. `plain` is what the valve without it leaves. It is
+    `sure` if it closes nearly all of a gap before, though more than noise is carried on.
     """
-    explained = carried <= odds.CLEAN and plain.closed_by(ladder.before) >= odds.MOSTLY
+    explained = (carried <= odds.CLEAN or sure) and plain.closed_by(ladder.before) >= odds.MOSTLY
     carried_on = carried > odds.CLEAN and ladder.before.excess <= carried
     if ladder.outcome == 'unknown_effect' and (explained or carried_on):
         return replace(ladder, outcome='adequate')

@@ -17,7 +17,14 @@ from . import odds
 from .adequacy import leftover
 from .base_valve import find_base, with_any_stem
 from .fitting import by_cost, eased, FAINT, Fitter, LONG, Problem, SHORT, Valve
-from .seen import calibration_seen, DWELL, dwell_seen, friction_seen
+from .seen import (
+    calibration_seen,
+    DWELL,
+    dwell_seen,
+    friction_seen,
+    shaken_seen,
+    SHAKES,
+)
 from .single_slips import slip_by_slip
 from .stages import Candidate, Group
 from .starts import friction_grid, grid, SHARES, START
@@ -79,7 +86,10 @@ def race(
         if 'f_d1' in free and valve.values['f_d1'] > valve.values['f_s']:
             # a play of the converter may have made up for friction
             frictions += [{**each, 'f_d1': START['f_d1']} for each in frictions]
-        shown = {DWELL: dwell_seen(fitter.bench, results)}
+        shown = {
+            DWELL: dwell_seen(fitter.bench, results),
+            SHAKES: shaken_seen(fitter.bench, held),
+        }
     done = 0
 
     def count(runner: Valve) -> Valve:
@@ -89,8 +99,8 @@ def race(
         return runner
 
     def screened(candidate: Candidate) -> Valve:
-        own = candidate.starts(seen) + candidate.suited(shown.get(candidate.effect, []))
-        return _screened(fitter, candidate, group, valve, own, frictions, lags, held)
+        own, suited = candidate.starts(seen), candidate.suited(shown.get(candidate.effect, []))
+        return _screened(fitter, candidate, group, valve, own, suited, frictions, lags, held)
 
     def evolved(runner: Valve, generations: int) -> Valve:
         more = fitter.evolve(runner, fitter.problem(group, runner), generations)
@@ -262,13 +272,15 @@ def _screened(
     group: Group,
     valve: Valve,
     own: Sequence[dict[str, float]],
+    suited: Sequence[dict[str, float]],
     frictions: Bases,
     lags: Bases,
     held: float,
 ) -> Valve:
     """Return the valve with one more effect after a short refit of its group.
 
-    `own` are starts of the effect, `held` is what holds the stem as the data show it [% of span].
+    `own` are starts of the effect, `suited` those that the data show, as they do what holds the
+    stem, `held` [% of span].
     """
     there = replace(
         valve,
@@ -281,6 +293,7 @@ def _screened(
     if len(own) > MOST_STARTS:
         costs = [fitter.scan(there, [{**usual, **start}], way)[0].cost for start in own]
         own = [own[index] for index in np.argsort(costs, kind='stable')[:FEWER_STARTS]]
+    own = [*own, *suited]
 
     levels = [level for level in (usual['f_s'], held) if level > 0.0]
 
@@ -311,8 +324,10 @@ def _screened(
     effect = CATALOGUE[candidate.effect]
     # in a second look the stem is put to rest for all
     led = RESTS in fitter.drive or (effect.laborious and not PUT_TO_REST.isdisjoint(fitter.drive))
-    if effect.rugged and first and not led:
-        found += slip_by_slip(fitter, there, [one for some in starts for one in some], problem)
+    if first and not led and (effect.rugged or effect.imitated or suited):
+        # what tells on every slip
+        some = starts if effect.rugged or effect.imitated else starts[-len(suited) :]
+        found += slip_by_slip(fitter, there, [one for each in some for one in each], problem)
     elif way != problem:
         found += [fitter.fit(each, way, SHORT) for each in best(starts, way, 1)]
     steps = SHORT if group.has_stem else LONG

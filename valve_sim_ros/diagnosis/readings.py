@@ -2,13 +2,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a measured signal shows by itself, without a model beside it."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
+import math
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 import numpy.typing as npt
 from scipy.ndimage import median_filter
-from scipy.signal import find_peaks
+from scipy.signal import find_peaks, periodogram
 
 from ..model.pipeline import Array
 
@@ -34,8 +35,24 @@ LARGE, UNMOVED, ANSWERED = 16.0, 4.0, 0.5
 noise, share]."""
 CREEP = 2.0
 """Between two lost commands one that creeps moves by no more than so many times its pace."""
+HIGH, LEAST_LINES = 0.25, 32
+"""From where on a spectrum tells noise [1 / sample], and frequencies that do."""
 Mask = npt.NDArray[np.bool_]
 Rows = npt.NDArray[np.intp]
+
+
+def between_lines(parts: Sequence[Array]) -> float:
+    """Return the noise of a signal in pieces [% of span] from its spectrum between lines.
+
+    A stem that is shaken swings at every sample. Infinite if there is too little of it.
+    """
+    bends = np.concatenate([np.diff(part, 2) for part in parts])
+    frequency, power = periodogram(bends[np.isfinite(bends)], window='hann')
+    high = frequency > HIGH
+    if high.sum() < LEAST_LINES:
+        return math.inf
+    white = power[high] / (2.0 - 2.0 * np.cos(2.0 * np.pi * frequency[high])) ** 2
+    return math.sqrt(float(np.median(white)) / (2.0 * math.log(2.0)))
 
 
 def filled(values: Array) -> Array:

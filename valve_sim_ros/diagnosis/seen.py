@@ -28,6 +28,11 @@ LEAST_RESTS = 20
 """Samples at rest that show what holds the stem."""
 DWELL, DWELLS, SCATTER = 'dwell_friction', tuple(np.geomspace(0.5, 200.0, 16).tolist()), 0.2
 """The effect, time constants that are tried [s], and how far what holds the stem scatters [%]."""
+SHAKES, AMPLITUDES = 'vibration', (0.4, 1.0, 2.5)
+"""The effect, and amplitudes from which a search starts [% of span]."""
+SLOWEST, QUICKEST, FINENESS, LINE = 0.02, 0.45, 0.1, 3.0
+"""Frequencies of a force that shakes the stem: from [Hz] to [1 / period of the samples], in such
+parts of what the record tells apart; and how far a line must stand out (5 in 100 do by chance)."""
 LEAST_LEFT, LEAVES = 6, 4.0
 """Rests that show friction which grows, and how far a stem is away that has left one [noise]."""
 
@@ -93,22 +98,76 @@ def dwell_seen(bench: Bench, results: Sequence[Array]) -> list[dict[str, float]]
     return found
 
 
-def _rests(bench: Bench, stretch: Stretch, result: Array) -> Array:
-    """Return how long each rest lasted [s] and what then held the stem [%], shape (n, 2)."""
+def shaken_seen(bench: Bench, held: float) -> list[dict[str, float]]:
+    """Return starts of a periodic force on the stem, from the moments at which the stem slips.
+
+    A force that shakes a resting stem lets it go up near its crests and down near its troughs:
+    moments and directions have a line in their spectrum. None if there is no such line.
+
+    Parameters
+    ----------
+    bench : Bench
+        The record.
+    held : float
+        What holds the stem as the data show it [% of span].
+    """
+    stretch = bench.stretches[0]
+    if not stretch.rests.size or math.isnan(held):
+        return []
+    left = _left(bench, stretch)
+    lefts, levels = np.array([each[1] for each in left]), np.array([each[2] for each in left])
+    time, x = stretch.time, stretch.measured['x']
+    length, period = float(time[-1] - time[0]), float(np.median(np.diff(time)))
+    frequencies = np.arange(SLOWEST, QUICKEST / period, FINENESS / length)
+    if lefts.size < LEAST_LEFT or not frequencies.size:
+        return []
+    moments, ways = 0.5 * (time[lefts] + time[lefts - 1]), np.sign(x[lefts] - levels)
+    angles = 2.0 * math.pi * frequencies[:, None] * (moments - time[0])
+    line = np.exp(-1j * angles) @ ways
+    top = int(np.argmax(np.abs(line)))
+    # by chance the power of each frequency is exponential; they are some for each that differs
+    if np.abs(line[top]) ** 2 / moments.size < LINE + math.log(FINENESS * frequencies.size):
+        return []
+    crest = float(np.angle(line[top])) + 0.5 * math.pi
+    return [
+        {
+            f'{SHAKES}.amplitude': amplitude,
+            f'{SHAKES}.frequency': float(frequencies[top]),
+            f'{SHAKES}.phase': math.remainder(crest + early, 2.0 * math.pi),
+            'f_s': held + share * amplitude,
+        }
+        for amplitude in AMPLITUDES
+        for early in (-0.6, 0.0)
+        for share in (0.2, 0.8)
+    ]
+
+
+def _left(bench: Bench, stretch: Stretch) -> list[tuple[int, int, float]]:
+    """Return each rest's first sample, 0 if unknown, the one that has left it, and its level."""
     x, near = stretch.measured['x'], LEAVES * bench.noise['x']
     known = np.isfinite(stretch.rests).astype(int)
     edges = np.flatnonzero(np.diff(known, prepend=0, append=0))
-    found: dict[int, tuple[float, float]] = {}
+    found: dict[int, tuple[int, int, float]] = {}
     for begin, end in zip(edges[::2], edges[1::2], strict=True):
         level = float(np.median(stretch.rests[begin:end]))
         away = np.flatnonzero(np.abs(x - level) > near)  # where lost, x is not away
         before, after = away[away < begin], away[away >= end]
-        if before.size and after.size:  # nobody knows how long the first and last rests last
-            first, left = int(before[-1]) + 1, int(after[0])
-            last = float(result[1, left - 1 : left + 1].mean())
-            if abs(last - result[1, first]) > 2.0 * near:  # else it may creep with p2
-                found[first] = float(stretch.time[left] - stretch.time[first]), abs(last - level)
-    return np.array(list(found.values())).reshape(-1, 2)
+        if after.size:
+            first = int(before[-1]) + 1 if before.size else 0
+            found[first] = first, int(after[0]), level
+    return list(found.values())
+
+
+def _rests(bench: Bench, stretch: Stretch, result: Array) -> Array:
+    """Return how long each rest lasted [s] and what then held the stem [%], shape (n, 2)."""
+    near = LEAVES * bench.noise['x']
+    found = []
+    for first, left, level in _left(bench, stretch):
+        last = float(result[1, left - 1 : left + 1].mean())
+        # nobody knows how long the first rest lasts; and a stem may creep with p2
+        if first and abs(last - result[1, first]) > 2.0 * near:
+            found.append((stretch.time[left] - stretch.time[first], abs(last - level)))
+    return np.array(found).reshape(-1, 2)
 
 
 def mixed_arrivals(bench: Bench, results: Sequence[Array]) -> bool:

@@ -3,10 +3,12 @@
 """Effects whose law hangs on every slip, fitted to single slips first."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from functools import cache
 from itertools import product
 
 from . import odds
-from .adequacy import leftover
+from .adequacy import Leftover, leftover
 from .fitting import by_cost, eased, FINE, Fitter, GENERATIONS, Problem, SHORT, Valve
 from .starts import STEMS
 from .stretch import CAUGHT, PUT_TO_REST, RESTS
@@ -16,7 +18,8 @@ BEGUN, DESCENT, FOLLOWED, TURNS, FINEST = 8, 12, 3, 25, 0.3
 to all slips, by evolutions of so many generations that begin with so little spread [steps of
 unknowns]."""
 FAR_OFF = 1.0
-"""Excess of a caught stem beyond which it is not worth while to let it go."""
+"""Excess of a caught stem beyond which it is not worth while to let it go, if the effect does not
+mostly explain x either."""
 
 
 def slip_by_slip(
@@ -38,6 +41,13 @@ def slip_by_slip(
     begun = sorted((fitter.fit(one, alone, SHORT) for one in nearest), key=by_cost)
     each = sorted((fitter.fit(one, alone, DESCENT) for one in begun[:BEGUN]), key=by_cost)
     found: list[Valve] = []
+
+    @cache
+    def plain(drive: tuple[str, ...]) -> Leftover:
+        """Return what the valve leaves without the effect."""
+        without = replace(valve, effects=valve.effects[:-1], candidates=valve.candidates[:-1])
+        return leftover(fitter.residuals(without, signal, drive))
+
     for there in each[:FOLLOWED]:
         for way in eased(problem):
             # single slips hardly tell the law: it is found where their moments hardly count
@@ -45,11 +55,11 @@ def slip_by_slip(
             turns, spread = (GENERATIONS, FINE) if first else (TURNS, FINEST)
             more = fitter.evolve(there, way, turns, spread)
             there = fitter.fit(more, way, DESCENT)
-            excess = leftover(fitter.residuals(there, signal, way[2])).excess
-            if excess > FAR_OFF:
+            left = leftover(fitter.residuals(there, signal, way[2]))
+            if left.excess > FAR_OFF and plain(way[2]).closed_by(left) < odds.MOSTLY:
                 break
         else:
             found.append(fitter.fit(there, problem, DESCENT))
-        if excess <= odds.CLEAN:
+        if left.excess <= odds.CLEAN:
             break
     return found

@@ -23,7 +23,8 @@ TIMES = ('t', 'time', '__time')
 def read_csv(path: str | os.PathLike[str], topics: Topics | None = None) -> Recording:
     """Read a CSV file with columns t [s], u and any of p1, p2, x [% of span], in any order.
 
-    The times may also stand in a column `time` or `__time`. An empty cell is a lost sample; the command before a lost one holds. `topics` renames columns.
+    The times may also stand in a column `time` or `__time`. An empty cell is a lost sample; the
+    command before a lost one holds. `topics` renames columns.
 
     Raises
     ------

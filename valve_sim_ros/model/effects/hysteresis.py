@@ -18,19 +18,19 @@ STEP, SHORTEST = 0.04, 0.1
 @njit
 def command(value: float, state: Any, p: Any, memory: Any, dt: float) -> float:
     """Return the command behind its hysteresis."""
-    return behind(value, p[0], p[4], memory[:PLAYS])
+    return behind(value, p[0], p[4], p[5], memory[:PLAYS])
 
 
 @njit
 def inlet(value: float, state: Any, p: Any, memory: Any, dt: float) -> float:
     """Return p1 behind its hysteresis."""
-    return behind(value, p[1], p[4], memory[PLAYS : 2 * PLAYS])
+    return behind(value, p[1], p[4], p[5], memory[PLAYS : 2 * PLAYS])
 
 
 @njit
 def sensor(value: float, state: Any, p: Any, memory: Any, dt: float) -> float:
     """Return x behind its hysteresis."""
-    return behind(value, p[2], p[4], memory[2 * PLAYS : 3 * PLAYS])
+    return behind(value, p[2], p[4], p[5], memory[2 * PLAYS : 3 * PLAYS])
 
 
 @njit
@@ -58,13 +58,27 @@ def stride(value: float, state: Any, p: Any, memory: Any, dt: float) -> float:
 
 
 @njit
-def behind(value: float, width: float, reach: float, memory: Any) -> float:
+def behind(value: float, width: float, reach: float, direct: float, memory: Any) -> float:
     """Return a signal behind plays, or behind a memory that fills gradually."""
     if width <= 0.0:
         return value
     if reach <= 0.0:
-        return mean_of_plays(value, width, memory)
+        return direct * value + (1.0 - direct) * mean_of_plays(value, width, memory)
     return bouc_wen(value, width, width * max(reach, 1.0), memory)
+
+
+def held_behind(
+    f_s: float,
+    command: float,
+    inlet: float,
+    stem: float,
+    force: float,
+    reach: float,
+    direct: float,
+) -> float:
+    """Return the friction that holds a stem whose x is seen behind plays as f_s does without."""
+    lag = stem if reach > 0.0 else 0.5 * (1.0 - direct) * (1.0 + 1.0 / PLAYS) * stem
+    return max(f_s - lag, 0.1 * f_s)
 
 
 EFFECT = Effect(
@@ -133,6 +147,17 @@ EFFECT = Effect(
             'over any share of it)',
             starts=(1.2, 2.5),
         ),
+        EffectParameter(
+            'direct',
+            'd',
+            '-',
+            0.0,
+            0.0,
+            0.9,
+            'linear',
+            'Share that passes without any play',
+            starts=(0.25,),
+        ),
     ),
     slots={
         'command_slot': command,
@@ -145,13 +170,16 @@ EFFECT = Effect(
     order=20,
     variants=(
         ('inlet_width',),
+        ('inlet_width', 'direct'),
         # plays may change places with f_d1, Bouc-Wen may not
         ('inlet_width', 'reach'),
         ('command_width', 'reach'),
         ('stem_width',),
+        ('stem_width', 'direct'),
         ('stem_width', 'reach'),
         ('force_width', 'reach'),
     ),
+    balance=held_behind,
     explanation='Many small plays, as in a worn linkage or a flapper, instead of a single one.',
     symptom='Rounded loops, with minor loops inside them, after each reversal.',
     confirm='Run small reversals of growing size slowly.',

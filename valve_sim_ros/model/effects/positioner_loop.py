@@ -9,18 +9,21 @@ from numba import njit
 
 from ..declarations import Effect, EffectParameter
 
+UNLIMITED = 1000.0
+"""An integral part that may be as large never is [%]."""
+
 
 @njit
 def command(value: float, state: Any, p: Any, memory: Any, dt: float) -> float:
     """Return the output of a PI controller of the stem position, u + K (u - x) + I."""
-    gain, integral_gain, overdrive, underdrive, initial = p
+    gain, integral_gain, overdrive, underdrive, initial, most = p
     if math.isnan(memory[0]):
         memory[0] = initial
     error = value - (state.x + dt * state.v)  # at the end of the step
     raised = value + gain * error + memory[0]
     low, high = -underdrive, 100.0 + overdrive
-    if low < raised < high or (raised <= low) == (error > 0.0):  # no wind-up
-        memory[0] += integral_gain * dt * error
+    if most < UNLIMITED or low < raised < high or (raised <= low) == (error > 0.0):  # no wind-up
+        memory[0] = min(max(memory[0] + integral_gain * dt * error, -most), most)
     return min(max(raised, low), high)
 
 
@@ -88,6 +91,19 @@ EFFECT = Effect(
             starts=(0.0,),
             step=0.5,
         ),
+        EffectParameter(
+            'integral_limit',
+            'I_m',
+            '%',
+            UNLIMITED,
+            0.0,
+            UNLIMITED,
+            'linear',
+            'Up to where the integral part winds up; 1000: it waits while the output is limited',
+            neutral=UNLIMITED,
+            starts=(20.0,),
+            step=0.5,
+        ),
     ),
     slots={'command_slot': command},
     memory=1,
@@ -97,6 +113,14 @@ EFFECT = Effect(
         ('gain',),
         ('gain', 'integral_gain', 'initial_integral'),
         ('gain', 'integral_gain', 'initial_integral', 'overdrive', 'underdrive'),
+        (
+            'gain',
+            'integral_gain',
+            'initial_integral',
+            'overdrive',
+            'underdrive',
+            'integral_limit',
+        ),
     ),
     explanation='A positioner compares the stem with the command and drives the converter harder.',
     symptom='p1 moves while u rests, and overshoots after each step until the stem has followed.',

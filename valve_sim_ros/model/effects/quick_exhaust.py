@@ -12,14 +12,18 @@ from ..declarations import Effect, EffectParameter
 
 @njit
 def flow(value: Any, state: Any, p: Any, memory: Any, dt: float) -> tuple[float, float]:
-    """Return the mean rate of a step that may pass the threshold."""
+    """Return the mean rate of a step in which it may close; memory: whether it is open."""
     target, rate = value
-    factor, threshold = p
-    excess = state.p2 - target
-    if dt <= 0.0 or excess <= threshold:
+    factor, threshold, reseat = p
+    excess, closing = state.p2 - target, reseat * threshold
+    if dt <= 0.0:
+        return target, rate
+    if excess <= closing or not (excess > threshold or memory[0] == 1.0):
+        memory[0] = 0.0
         return target, rate
     fast = factor * rate
-    until = math.log(excess / threshold) / fast if threshold > 0.0 else dt
+    until = math.log(excess / closing) / fast if closing > 0.0 else dt
+    memory[0] = 1.0 if until >= dt else 0.0
     if until >= dt:
         return target, fast
     return target, (fast * until + rate * (dt - until)) / dt
@@ -55,8 +59,22 @@ EFFECT = Effect(
             neutral=8.0,
             starts=(4.0, 8.0, 15.0),
         ),
+        EffectParameter(
+            'reseat',
+            'D_0/D',
+            '-',
+            1.0,
+            0.0,
+            1.0,
+            'linear',
+            'Share of the threshold below which the exhaust closes again',
+            neutral=1.0,
+            starts=(0.4, 0.7),
+        ),
     ),
+    variants=(('factor', 'threshold'), ('factor', 'threshold', 'reseat')),
     slots={'flow_slot': flow},
+    memory=1,
     longest_step=0.1,
     order=20,
     explanation='A valve at the actuator opens to the atmosphere once p2 exceeds p1 enough.',
