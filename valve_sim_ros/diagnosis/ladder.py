@@ -104,6 +104,16 @@ def climb(
             return False
         return odds.suspicious(left, group, fitter.bench.mixed)
 
+    def chance_apart(valve: Valve, left: Leftover) -> Leftover:
+        """Return what is left but for slips that hang on noise, all if it is worth a look."""
+        if not group.has_stem or again or not worth(left):
+            return left
+        rest = leftover(but_one_slip(fitter.residuals(valve, group.signal)))
+        if not worth(rest):
+            return rest
+        rest = on_time(fitter, group, valve)
+        return rest if rest.excess <= odds.SPOTLESS and rest.far < odds.MORE_FAR else left
+
     def sought(left: Leftover) -> Sequence[Candidate]:
         if left is chance:
             return ()
@@ -129,14 +139,9 @@ def climb(
                 if not worth(left):
                     now, before = loose, left
             base, base_left = now, before
-        if group.has_stem and not again and worth(before):
-            rest = leftover(but_one_slip(fitter.residuals(now, group.signal)))
-            if not worth(rest):
-                before = base_left = chance = rest
-            else:
-                rest = on_time(fitter, group, now)
-                if rest.excess <= odds.SPOTLESS and rest.far < odds.MORE_FAR:
-                    before = base_left = chance = rest
+        rest = chance_apart(now, before)
+        if rest is not before:
+            before = base_left = chance = rest
         for step in range(MOST_EFFECTS):
             some = sought(before)
             if not some:
@@ -181,12 +186,15 @@ def climb(
                 if CATALOGUE[rung.effect].rugged and not again:
                     break
             rungs.append(rung)
-            now, before = rung.valve, rung.after
+            now, before = rung.valve, chance_apart(rung.valve, rung.after)
+            if before is not rung.after:
+                rungs[-1] = replace(rung, after=before, closed=rung.before.closed_by(before))
+                break
             others = [each for each in candidates if each.effect != rung.effect]
             candidates = [each for each in others if not (again and _laborious(each.effect))]
         progress(1.0)
         complete = True
-    after = leftover(fitter.residuals(now, group.signal))
+    after = before if rungs else leftover(fitter.residuals(now, group.signal))
     return Ladder(group, 'adequate', base, now, base_left, after, tuple(rungs), guess, complete)
 
 
