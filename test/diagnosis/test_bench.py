@@ -277,6 +277,7 @@ def test_a_loop_is_seen_through_a_stem_held_where_it_was_measured():
         'positioner_loop.initial_integral': 4.0,
         'positioner_loop.overdrive': 20.0,
         'positioner_loop.underdrive': 20.0,
+        'positioner_loop.integral_limit': 1000.0,
     }
     bench = Bench([recording(noise=0.2, **loop)])
     wrong_stem = {**VALUES, 'f_s': 12.0, 'p1_0': 0.0, 'p2_0': 0.0, 'x_0': 0.0}
