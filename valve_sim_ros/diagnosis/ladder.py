@@ -186,9 +186,11 @@ def climb(
                 if CATALOGUE[rung.effect].rugged and not again:
                     break
             rungs.append(rung)
-            now, before = rung.valve, chance_apart(rung.valve, rung.after)
-            if before is not rung.after:
-                rungs[-1] = replace(rung, after=before, closed=rung.before.closed_by(before))
+            now, before = rung.valve, rung.after  # first, so that an end here loses nothing
+            rest = chance_apart(now, before)
+            if rest is not before:
+                before = rest
+                rungs[-1] = replace(rung, after=rest, closed=rung.before.closed_by(rest))
                 break
             others = [each for each in candidates if each.effect != rung.effect]
             candidates = [each for each in others if not (again and _laborious(each.effect))]

@@ -324,9 +324,9 @@ def _screened(
     effect = CATALOGUE[candidate.effect]
     # in a second look the stem is put to rest for all
     led = RESTS in fitter.drive or (effect.laborious and not PUT_TO_REST.isdisjoint(fitter.drive))
-    if first and not led and (effect.rugged or effect.imitated or suited):
-        # what tells on every slip
-        some = starts if effect.rugged or effect.imitated else starts[-len(suited) :]
+    # what tells on every slip
+    some = starts if effect.rugged or effect.imitated else starts[len(own) - len(suited) :]
+    if first and not led and some:
         found += slip_by_slip(fitter, there, [one for each in some for one in each], problem)
     elif way != problem:
         found += [fitter.fit(each, way, SHORT) for each in best(starts, way, 1)]

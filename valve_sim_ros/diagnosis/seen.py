@@ -30,6 +30,9 @@ DWELL, DWELLS, SCATTER = 'dwell_friction', tuple(np.geomspace(0.5, 200.0, 16).to
 """The effect, time constants that are tried [s], and how far what holds the stem scatters [%]."""
 SHAKES, AMPLITUDES = 'vibration', (0.4, 1.0, 2.5)
 """The effect, and amplitudes from which a search starts [% of span]."""
+EARLY, CARRIED = (-0.6, 0.0), (0.2, 0.8)
+"""How far slips come before a crest [rad], and by which shares of the amplitude more holds the
+stem than is seen to: starts, too."""
 SLOWEST, QUICKEST, FINENESS, LINE = 0.02, 0.45, 0.1, 3.0
 """Frequencies of a force that shakes the stem: from [Hz] to [1 / period of the samples], in such
 parts of what the record tells apart; and how far a line must stand out (5 in 100 do by chance)."""
@@ -111,7 +114,7 @@ def shaken_seen(bench: Bench, held: float) -> list[dict[str, float]]:
     held : float
         What holds the stem as the data show it [% of span].
     """
-    stretch = bench.stretches[0]
+    stretch = bench.stretches[0]  # the phase counts from the first sample of each
     if not stretch.rests.size or math.isnan(held):
         return []
     left = _left(bench, stretch)
@@ -137,8 +140,8 @@ def shaken_seen(bench: Bench, held: float) -> list[dict[str, float]]:
             'f_s': held + share * amplitude,
         }
         for amplitude in AMPLITUDES
-        for early in (-0.6, 0.0)
-        for share in (0.2, 0.8)
+        for early in EARLY
+        for share in CARRIED
     ]
 
 

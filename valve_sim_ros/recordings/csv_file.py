@@ -108,8 +108,8 @@ def _columns(
     missing += [names['u']] if names['u'] not in header else []
     if missing:
         raise RecordingError(
-            f'{path}: no column {missing[0]!r}; it has {", ".join(header)}; expected t, u and any '
-            'of p1, p2, x (say which with --topic x=COLUMN)'
+            f'{path}: no column {missing[0]!r}; it has {", ".join(header)}; expected t (or time), '
+            'u and any of p1, p2, x (say which with --topic x=COLUMN)'
         )
     return {
         signal: (

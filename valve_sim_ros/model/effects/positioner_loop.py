@@ -22,7 +22,8 @@ def command(value: float, state: Any, p: Any, memory: Any, dt: float) -> float:
     error = value - (state.x + dt * state.v)  # at the end of the step
     raised = value + gain * error + memory[0]
     low, high = -underdrive, 100.0 + overdrive
-    if most < UNLIMITED or low < raised < high or (raised <= low) == (error > 0.0):  # no wind-up
+    # it winds up to its limit, or not at all
+    if most < UNLIMITED or low < raised < high or (raised <= low) == (error > 0.0):
         memory[0] = min(max(memory[0] + integral_gain * dt * error, -most), most)
     return min(max(raised, low), high)
 
