@@ -155,7 +155,9 @@ def stribeck_friction(rng: Rng, valve: Physics, length: float) -> Changes:
 
 
 def presliding(rng: Rng, valve: Physics, length: float) -> Changes:
-    """Hold the stem by elastic bristles that give by this share of the band."""
+    """Hold the stem by elastic bristles that give by this share of the band, or that break."""
+    if rng.random() < 0.3:
+        return {'brittle': 1.0 / rng.uniform(0.1, 0.6)}
     changes = {'bristle': 1.0 / rng.uniform(0.1, 0.6), 'dahl': float(rng.random() < 0.4)}
     if not changes['dahl']:
         changes['bristle_stribeck'] = log_uniform(rng, 0.01, 0.1)
@@ -163,7 +165,9 @@ def presliding(rng: Rng, valve: Physics, length: float) -> Changes:
 
 
 def dwell_friction(rng: Rng, valve: Physics, length: float) -> Changes:
-    """Let the breakaway force grow at rest, exponentially or rationally."""
+    """Let the breakaway force grow at rest, exponentially, rationally or with each decade."""
+    if rng.random() < 0.3:
+        return {'dwell_decade': rng.uniform(0.15, 0.6), 'dwell_time': log_uniform(rng, 0.3, 5.0)}
     return {
         'dwell_gain': rng.uniform(0.1, 1.5),
         'dwell_time': log_uniform(rng, 4.0, 60.0),

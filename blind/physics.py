@@ -66,10 +66,12 @@ class Physics(NamedTuple):
     bristle: float = 0.0
     bristle_damping: float = 0.0
     bristle_stribeck: float = 0.02
+    brittle: float = 0.0
     dahl: float = 0.0
     dwell_gain: float = 0.0
     dwell_time: float = 10.0
     dwell_rational: float = 0.0
+    dwell_decade: float = 0.0
     friction_drift: float = 0.0
     # forces on the stem, and its limits
     preload: float = 0.0

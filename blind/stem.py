@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Chamber pressure to stem position: spring, stops, flow, and dry friction that sticks."""
 
-from math import exp, pi, sin
+from math import exp, log10, pi, sin
 
 import numba
 
@@ -59,6 +59,8 @@ def friction_scale(direction, x, q, t):
 @numba.njit
 def breakaway(rest, q):
     """Return the static friction after this time at rest."""
+    if q.dwell_decade > 0.0:
+        return q.f_s * (1.0 + q.dwell_decade * log10(1.0 + rest / q.dwell_time))
     if q.dwell_gain == 0.0:
         return q.f_s
     if q.dwell_rational > 0.0:
@@ -103,12 +105,30 @@ def bristles(force, s, q, h, t):
 
 
 @numba.njit
+def brittle(force, s, q, h, t):
+    """Return the new speed of a stem that hangs on a spring of its own until that one breaks."""
+    moved = s[at.V] != 0.0
+    if not moved:
+        gives = (force - q.brittle * s[at.BRISTLE]) / (q.brittle + q.spring_rate)
+        s[at.X] += gives
+        s[at.BRISTLE] += gives
+        force = q.brittle * s[at.BRISTLE]
+    v = coulomb(force, s, q, h, t)
+    if moved and v == 0.0:
+        s[at.BRISTLE] = force / q.brittle
+    return v
+
+
+@numba.njit
 def stem(p2, s, q, h, t):
     """Advance the stem (the speed first, then the position with the new speed)."""
     x = s[at.X]
     force = push(p2, x, s, q, t) + contact(x, q)
     if q.bristle > 0.0:
         v = bristles(force, s, q, h, t)
+    elif q.brittle > 0.0:
+        v = brittle(force, s, q, h, t)
+        x = s[at.X]
     else:
         v = coulomb(force, s, q, h, t)
     v = min(max(v, -q.v_down), q.v_up)

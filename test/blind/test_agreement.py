@@ -95,6 +95,7 @@ OTHER_FORMS = [
         {'bristle': 4.0, 'bristle_stribeck': 0.03},
         {'compliance': 0.25, 'drop_speed': 0.03},
     ),
+    ('presliding', {'brittle': 5.0}, {'compliance': 0.0, 'stuck_compliance': 0.2}),
     (
         'nonlinear_flow',
         {'flow_critical': 0.3, 'flow_absolute': 60.0},
@@ -166,6 +167,11 @@ OTHER_FORMS = [
         'dwell_friction',
         {'dwell_gain': 0.8, 'dwell_time': 10.0, 'dwell_rational': 1.0},
         {'growth': 0.8, 'time_constant': 10.0, 'shape': 1.0},
+    ),
+    (
+        'dwell_friction',
+        {'dwell_decade': 0.3, 'dwell_time': 5.0},
+        {'growth': 3.0, 'time_constant': 127.7, 'shape': 20.0},
     ),
     (
         'sensor_drift',

@@ -82,3 +82,55 @@ def test_a_lag_before_the_play_is_told_from_one_behind_it():
     assert named.rung.effect == 'ip_lag'
     assert named.values['ip_lag.time_constant'] == pytest.approx(0.8, rel=0.03)
     assert named.values['ip_lag.upstream'] == pytest.approx(1.0, abs=0.05)
+
+
+QUICK = {'f_d1': 0.5, 'T_g1': 1.0, 'T_g2': 2.0, 'f_s': 4.0, 'f_d': 2.4}
+
+
+def sampled(u, every, offset=0):
+    """Return a record in which only some samples of the commands, and of what follows, are seen.
+
+    Outputs are seen `offset` samples after the command beside them.
+    """
+    run = simulate(u, 0.05, QUICK)
+    rng = np.random.default_rng(1)
+    outputs = (each[offset::every] for each in (run.p1, run.p2))
+    noisy = [each + 0.2 * rng.standard_normal(each.size) for each in outputs]
+    size = noisy[0].size
+    return Recording(run.t[::every][:size], u[::every][:size], *noisy)
+
+
+def steps_at_any_time(rng):
+    """Return 0.05 s samples of a command that steps whenever it likes."""
+    return np.repeat(rng.uniform(10.0, 90.0, 50), rng.integers(250, 600, 50))
+
+
+@pytest.mark.parametrize('offset', [0, 8])
+def test_steps_that_come_at_any_time_are_put_where_they_came(offset):
+    found = diagnose([sampled(steps_at_any_time(np.random.default_rng(2)), 10, offset)])
+    assert found.verdict == 'adequate'
+    assert max(ladder.before.excess for ladder in found.ladders) < 0.2
+    values = found.base_valve.values
+    assert [values[n] for n in ('T_g1', 'T_g2')] == pytest.approx([1.0, 2.0], rel=0.03)
+
+
+def test_an_effect_of_the_chamber_is_no_scatter_of_commands():
+    u = steps_at_any_time(np.random.default_rng(2))
+    run = simulate(
+        u, 0.5, {**QUICK, 'effects': ['nonlinear_flow'], 'nonlinear_flow.exponent': 0.6}
+    )
+    rng = np.random.default_rng(1)
+    noisy = [each + 0.2 * rng.standard_normal(u.size) for each in (run.p1, run.p2)]
+    found = diagnose([Recording(run.t, u, *noisy)])
+    assert [named.rung.effect for named in found.effects] == ['nonlinear_flow']
+    assert not any(stretch.sooner.any() for stretch in found.bench.stretches)
+
+
+def test_a_swing_that_is_late_by_a_part_of_a_period_is_no_lag():
+    u = 50.0 + 40.0 * np.sin(2.0 * np.pi * np.arange(12_000) / 900.0)
+    late = np.concatenate([np.full(3, u[0]), u[:-3]])
+    run, rng = simulate(late, 0.05, QUICK), np.random.default_rng(1)
+    p1 = run.p1[::10] + 0.2 * rng.standard_normal(1200)
+    found = diagnose([Recording(run.t[::10], u[::10], p1)])
+    assert found.verdict == 'adequate'
+    assert found.base_valve.values['blend'] == pytest.approx(0.3, abs=0.05)

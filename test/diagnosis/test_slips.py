@@ -6,11 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from valves import recording, VALUES
+from valves import recording, slow_valve, VALUES
 
 from valve_sim_ros.diagnosis import odds
 from valve_sim_ros.diagnosis.adequacy import but_one_slip, leftover
-from valve_sim_ros.diagnosis.base_valve import on_time
+from valve_sim_ros.diagnosis.base_valve import find_base, on_time, starting_valve
 from valve_sim_ros.diagnosis.bench import Bench
 from valve_sim_ros.diagnosis.fitting import Fitter, Valve
 from valve_sim_ros.diagnosis.proof import prove
@@ -18,6 +18,7 @@ from valve_sim_ros.diagnosis.seen import dwell_seen, shaken_seen
 from valve_sim_ros.diagnosis.stages import groups
 from valve_sim_ros.diagnosis.stretch import CAUGHT
 from valve_sim_ros.diagnosis.unknowns import complete
+from valve_sim_ros.model.effects.dwell_friction import SHAPES
 from valve_sim_ros.recordings.quality import roughness
 from valve_sim_ros.recordings.recording import Recording
 
@@ -31,12 +32,14 @@ def fitter_of(**effects):
 
 
 def held_after(rest, law):
-    """Return what holds a stem after a time at rest, by the exponential law."""
-    grown = 1.0 - np.exp(-rest / law['dwell_friction.time_constant'])
+    """Return what holds a stem after a time at rest."""
+    shape, part = law['dwell_friction.shape'], rest / law['dwell_friction.time_constant']
+    grown = 1.0 - ((1.0 + shape * part) ** (-1.0 / shape) if shape else np.exp(-part))
     return law['f_s'] * (1.0 + law['dwell_friction.growth'] * grown)
 
 
-def test_rests_of_all_lengths_show_how_friction_grows():
+@pytest.mark.parametrize('which', range(3))
+def test_rests_of_all_lengths_show_how_friction_grows(which):
     rng = np.random.default_rng(3)
     pieces = [np.full(20, 30.0)]
     for k in range(60):  # up and down slowly, with rests between
@@ -44,17 +47,18 @@ def test_rests_of_all_lengths_show_how_friction_grows():
         pieces.append(np.full(rng.integers(1, 150), pieces[-1][-1]))
     u = np.concatenate(pieces)
     there = {**VALUES, 'T_g1': 0.1, 'T_g2': 0.1, **dict.fromkeys(STARTING, 30.0), **DWELL}
+    there['dwell_friction.shape'] = SHAPES[which]
     bench = Bench([Recording(0.2 * np.arange(u.size), u, p1=u)])
-    (truth,) = bench.run(complete({**there, 'dwell_friction.shape': 0.0}), ('dwell_friction',))
+    (truth,) = bench.run(complete(there), ('dwell_friction',))
     noisy = truth[:3] + 0.2 * rng.standard_normal((3, u.size))
     fitter = Fitter(Bench([Recording(0.2 * np.arange(u.size), u, *noisy)]))
     group, valve = groups(fitter.bench.signals)[-1], Valve(there)
-    law, _ = dwell_seen(fitter.bench, fitter.results(valve))
+    law = dwell_seen(fitter.bench, fitter.results(valve))[which]
     for rest in (5.0, 30.0):
         assert held_after(rest, law) == pytest.approx(held_after(rest, there), rel=0.1)
     dwell = [each for each in group.candidates() if each.effect == 'dwell_friction']
     suited = [each.suited(dwell_seen(fitter.bench, fitter.results(valve))) for each in dwell]
-    assert [len(each) for each in suited] == [1, 2]
+    assert [len(each) for each in suited] == [1, 3]
 
 
 SHAKES = {'vibration.amplitude': 0.6, 'vibration.frequency': 0.51, 'vibration.phase': 1.0}
@@ -89,6 +93,21 @@ def test_a_swing_at_every_sample_is_no_noise():
     noise = swinging.noise
     assert roughness([swinging.stretches[0].measured['x']]) > 3.0 * noise['p2']
     assert noise['x'] < 2.0 * noise['p2'] == pytest.approx(0.4, rel=0.1)
+
+
+@pytest.mark.parametrize('damping', [0.35, 0.7])
+def test_a_stem_that_is_there_within_a_sample_is_found_by_single_slips(damping):
+    levels = [(80, level) for level in 30.0 + 40.0 * np.random.default_rng(3).random(40)]
+    quick = {'f_s': 6.0, 'a_1/a_2': 100.0, 'damping': damping}
+    there, _, noisy = slow_valve(levels, 0.15, T_g1=1.0, T_g2=4.0, **quick)
+    fitter = Fitter(Bench([noisy]))
+    group = groups(fitter.bench.signals)[-1]
+    start = starting_valve(fitter.bench)
+    before = {name: there[name] for name in ('f_d1', 'T_g1', 'T_g2')}
+    start = replace(start, values={**start.values, **before})
+    found = find_base(fitter, group, start, group.drive)
+    true = replace(found, values={**found.values, **there})
+    assert found.cost < 1.02 * fitter.score(true, 'x', group.drive)
 
 
 def test_a_play_holds_the_stem_with_less_friction():

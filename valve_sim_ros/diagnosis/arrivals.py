@@ -2,12 +2,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """On which side of a sample each command came, where p1 does not show it."""
 
+from collections.abc import Sequence
 import math
 
 import numpy as np
 
 from ..model.pipeline import Array
 from ..recordings.recording import OUTPUTS
+from . import odds
 from .adequacy import leftover
 from .fitting import Fitter, Problem, Valve
 from .seen import ENOUGH_STEPS, LEAST_EACH
@@ -23,6 +25,9 @@ SURE = 0.25
 LEAST_PUSH, MOST_CELLS = 1.0, 5e6
 """What a sample more of a step must do to p2 [noise]; the largest are looked at, no more cells of
 samples times steps than so many."""
+SPREAD = math.sqrt(1.0 / 12.0)
+"""Standard deviation of commands that come at any time [periods]."""
+NONE = np.empty(0, dtype=np.intp), np.empty(0)
 
 
 def put_in_its_period(fitter: Fitter, group: Group, valve: Valve, problem: Problem) -> Valve:
@@ -59,13 +64,40 @@ def put_in_its_period(fitter: Fitter, group: Group, valve: Valve, problem: Probl
             return fitter.refined(valve, problem)
         for stretch, u in zip(stretches, sent, strict=True):
             stretch.send(u)
-        return valve
+        return _when_they_came(fitter, group, valve, problem, each)
     sooner = on_time > RARE * early
     for stretch, (steps, shifts, errors) in zip(stretches, each, strict=True):
         # those that are hardly told stay with the most
         likelier_early = (shifts - 0.5) / errors**2 + math.log(early / on_time) > 0.0
         stretch.put(steps[likelier_early == sooner], sooner)
     return fitter.refined(valve, problem)
+
+
+def _when_they_came(
+    fitter: Fitter,
+    group: Group,
+    valve: Valve,
+    problem: Problem,
+    told: Sequence[tuple[Rows, Array, Array]],
+) -> Valve:
+    """Let each step come when it was told to have come, if nothing but noise is left then.
+
+    Who sends commands keeps other times than who takes samples.
+    """
+    _, signal, drive = problem
+    if leftover(fitter.residuals(valve, signal, drive)).excess <= odds.SPOTLESS:
+        return valve
+    phase, stretches = valve.values['phase'], fitter.bench.stretches
+    for stretch, (steps, shifts, errors) in zip(stretches, told, strict=True):
+        known = SPREAD**2 / (SPREAD**2 + errors**2)
+        came = np.clip(shifts, fitter.phase.lower, fitter.phase.upper)
+        stretch.scatter(steps, known * (came - phase))
+    there = fitter.refined(valve, problem)
+    if leftover(fitter.residuals(there, signal, drive)).excess <= odds.SPOTLESS:
+        return there
+    for stretch in stretches:
+        stretch.scatter(*NONE)
+    return valve
 
 
 def shifts_of_steps(

@@ -11,19 +11,21 @@ from .arrivals import put_in_its_period
 from .bench import Bench, MIXED_JITTER
 from .fitting import by_cost, eased, FINE, Fitter, NARROW, PATIENT, Problem, SHORT, Valve
 from .seen import friction_seen, mixed_arrivals
+from .single_slips import slip_by_slip
 from .stages import Group
 from .starts import friction_grid, grid, nearby, START, STEMS, SWEEP
 from .unknowns import EARLY, LATE, PHASE, Unknown
 
 FEW_STARTS = 3
 """So many starts are followed."""
-SWEPT, FOLLOWED, GENERATIONS, TURNS = 4, 4, 30, 3
+SWEPT, FOLLOWED, GENERATIONS, FINENESS, SCATTERS = 4, 4, 30, 14, 8
 """So many base valves are tried with stems of all kinds; so many are followed by an evolution
-where costs are rugged, and for how long; and most turns along a narrow valley."""
-HARDLY = 0.95
-"""Share of the cost that is left where another turn is not worth its time."""
+where costs are rugged, and for how long; the binary logarithm of how many are scattered around
+the best, and how many of them are followed."""
 NEARLY = 0.95
 """Phase beyond which a command acts nearly a whole period late or early."""
+BLENDS = (0.1, 0.3, 0.5, 0.7, 0.9)
+"""Parts of a period by which commands that go on and on may be late."""
 LAG, CLEARLY = 'ip_lag', 50.0
 """An answer that lags may have gone less than half the way where it is first seen: with it that
 sample must be told so much better."""
@@ -87,6 +89,8 @@ def find_base(
         return found[0]
     if not group.has_stem:
         best = fitter.refined(found[0], problem)
+        if group.stages == ('u-p1',):
+            return _late_on_ramps(fitter, group, best, drive)
         return put_in_its_period(fitter, group, best, problem)
     swept = [with_any_stem(fitter, each, problem) for each in found[:SWEPT]]
     found += [fitter.fit(each, problem, SHORT) for each in swept]
@@ -98,30 +102,48 @@ def find_base(
         return best
     # caught where it is far from its rest, a stem that slips too late is only a little wrong
     way = eased(problem)[0]
+    if len(group.stages) == 1 and way != problem:
+        found += slip_by_slip(fitter, valve, starts, problem)
+        best = min(found, key=by_cost)
+        left = leftover(fitter.residuals(best, group.signal, drive))
+        if not (closely or odds.suspicious(left, group, fitter.bench.mixed)):
+            return fitter.refined(best, problem)
     eases = found if way == problem else followed(way)
     rested = [fitter.evolve(each, way, GENERATIONS, NARROW) for each in eases]
-    if len(group.stages) > 1:
-        rested += _along_the_valley(fitter, best, way)
+    if len(group.stages) > 1 and way != problem:
+        rested += _along_the_valley(fitter, best, problem)
     found += [fitter.fit(each, problem) for each in rested]
     found = sorted(found, key=by_cost)[:FOLLOWED]
     found += [fitter.evolve(each, problem, GENERATIONS, NARROW) for each in found]
     return fitter.refined(min(found, key=by_cost), problem)
 
 
-def _along_the_valley(fitter: Fitter, valve: Valve, way: Problem) -> list[Valve]:
+def _late_on_ramps(fitter: Fitter, group: Group, valve: Valve, drive: Sequence[str]) -> Valve:
+    """Return a valve that commands which go on and on reach late by a part of a period.
+
+    Samples of them say where they were then, not where they stayed until the next one.
+    """
+    fitter.blend = True
+    problem = (fitter.unknowns(group), group.signal, tuple(drive))
+    starts = [{**valve.values, 'blend': share} for share in BLENDS]
+    late = min(
+        (fitter.fit(each, problem) for each in fitter.scan(valve, starts, problem, 2)), key=by_cost
+    )
+    inflation = leftover(fitter.residuals(late, group.signal, drive)).inflation
+    if 0.5 * (valve.cost - late.cost) / inflation >= odds.TWIN_GAIN:
+        return late
+    fitter.blend = False
+    return valve
+
+
+def _along_the_valley(fitter: Fitter, valve: Valve, problem: Problem) -> list[Valve]:
     """Return valves with other frictions, for which their lags make up."""
-    _, signal, drive = way
-    found: list[Valve] = []
-    valve = replace(valve, cost=fitter.score(valve, signal, drive))
-    for _ in range(TURNS):
-        kinds = _apart(nearby(valve.values), 'f_d/f_s')
-        tried = sorted((fitter.scan(valve, some, way)[0] for some in kinds), key=by_cost)
-        found += [fitter.evolve(each, way, PATIENT, FINE) for each in tried[:FEW_STARTS]]
-        better = min(found, key=by_cost)
-        left = leftover(fitter.residuals(better, signal, drive))
-        if left.excess <= odds.SPOTLESS or better.cost > HARDLY * valve.cost:
-            break
-        valve = better
+    caught, on_time, _ = eased(problem)
+    scattered = nearby(valve.values, problem[0], FINENESS)
+    found = fitter.scan(valve, scattered, caught, SCATTERS)
+    for way, turns in ((caught, PATIENT), (on_time, GENERATIONS)):
+        led = [fitter.fit(fitter.evolve(each, way, turns, FINE), way) for each in found]
+        found = sorted(led, key=by_cost)[:FEW_STARTS]
     return found
 
 
@@ -181,6 +203,7 @@ def _settle_phase(fitter: Fitter, group: Group, valve: Valve) -> None:
         starts = [{**values, **own, **there} for own in added for there in points]
         return fitter.fit(fitter.scan(kind, starts, problem)[0], problem, SHORT)
 
+    fitter.blend = False
     early, late = (fitted(valve, [{}], phase) for phase in (EARLY, LATE))
     lags_early, lags_late = (fitted(lagging, lag.starts({}), phase) for phase in (EARLY, LATE))
     # a lag of 0 is none: the search with one may have ended elsewhere

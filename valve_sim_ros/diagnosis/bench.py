@@ -22,6 +22,7 @@ from .readings import (
     bridged,
     coarse_step,
     filled,
+    foreseen,
     resolution_of,
     REST,
     slope_of,
@@ -125,6 +126,8 @@ class Bench:
         )
         time = recording.time[part] - recording.time[part][0]
         measured = {name: np.array(recording.output(name)[part]) for name in self.signals}
+        if 'p1' in measured and foreseen(sent, measured['p1'], noise_of([measured['p1']]), unsure):
+            sent, unsure = np.append(sent[1:], sent[-1]), np.maximum(unsure - 1, 1)
         stretch = Stretch(time, sent, measured, unsure=unsure)
         stretch.hide(unsure - 1)
         return stretch
@@ -185,7 +188,9 @@ class Bench:
         theta = np.array([*(values[name] for name in THETA), DELTA.default, 0.0])
         if HELD in drive:
             theta[STUCK] = IMMENSE
-        grid = self.stretches[index].grid(values.get('phase', 0.0), tuple(drive))
+        grid = self.stretches[index].grid(
+            values.get('phase', 0.0), tuple(drive), values.get('blend', 0.0)
+        )
         outputs = np.empty((BESIDE + 1, grid.u.size))
         slack = min(SLACK, SLACK_SHARE * values['f_s'])
         if {RESTS, CAUGHT} & {*drive}:

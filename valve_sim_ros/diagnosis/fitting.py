@@ -15,7 +15,7 @@ from .descent import descend, walk
 from .evolution import evolve
 from .stages import Candidate, Group
 from .stretch import CAUGHT, ON_TIME, PUT_TO_REST
-from .unknowns import complete, PHASE, to_point, to_values, Unknown
+from .unknowns import BLEND, complete, PHASE, to_point, to_values, Unknown
 from .workers import cheapest
 
 HOPELESS = 1e3
@@ -69,12 +69,14 @@ class Fitter:
 
     bench: Bench
     phase: Unknown = PHASE
+    blend: bool = False
     drive: tuple[str, ...] = ()
     seed: int = 0
 
     def unknowns(self, group: Group) -> tuple[Unknown, ...]:
         """Return what a fit of the base valve varies in a group."""
-        return group.unknowns(len(self.bench.stretches), self.phase)
+        own = (BLEND,) if self.blend and group.stages == ('u-p1',) else ()
+        return (*group.unknowns(len(self.bench.stretches), self.phase), *own)
 
     def results(self, valve: Valve, drive: Sequence[str] | None = None) -> list[Array]:
         """Return what `Bench.run` makes of a valve, driven as is usual here unless told."""
@@ -162,13 +164,14 @@ class Fitter:
             spread = FINE if way == problem else NARROW
             there = self.fit(self.evolve(there, way, GENERATIONS, spread), way)
         valve = min(valve, there, key=by_cost)
-        for _ in range(MOST_TURNS):
-            more = self.evolve(valve, problem, GENERATIONS, NARROW)
-            more = self.fit(more, problem)
-            ends = more.cost > 0.99 * valve.cost
-            valve = min(valve, more, key=by_cost)
-            if ends:
-                break
+        for spread in (NARROW, FINE):
+            for _ in range(MOST_TURNS):
+                more = self.evolve(valve, problem, GENERATIONS, spread)
+                more = self.fit(more, problem)
+                ends = more.cost > 0.99 * valve.cost
+                valve = min(valve, more, key=by_cost)
+                if ends:
+                    break
         return valve
 
     def problem(self, group: Group, valve: Valve) -> Problem:

@@ -33,6 +33,9 @@ of the command beyond which x may bend [%]."""
 LARGE, UNMOVED, ANSWERED = 16.0, 4.0, 0.5
 """A step of p1 that tells when it came; p1 has not moved yet; and part of it seen at once [noise,
 noise, share]."""
+FORESEEN, LEAST_SOON, LEAST_SHARE = 0.8, 3, 0.1
+"""Part of a step of p1 that is seen before the command, if p1 foresees it; and so many such steps
+at least, and as a share of all, are no chance."""
 CREEP = 2.0
 """Between two lost commands one that creeps moves by no more than so many times its pace."""
 HIGH, LEAST_LINES = 0.25, 32
@@ -152,6 +155,22 @@ def answers_to_steps(u: Array, p1: Array, noise: float) -> tuple[int, int]:
     large = both > LARGE * noise
     late = large & (first < UNMOVED * noise)
     return int(late.sum()), int((large & (first > ANSWERED * both)).sum())
+
+
+def foreseen(u: Array, p1: Array, noise: float, unsure: Rows) -> bool:
+    """Tell whether p1 answers some single steps of the command before the sample that shows them.
+
+    So it is where outputs were sampled, or stamped, later than the commands beside them. The steps
+    at the samples `unsure` do not tell: their commands were lost.
+    """
+    moves = np.diff(u) != 0.0
+    steps = np.flatnonzero(moves[1:-1] & ~moves[:-2] & ~moves[2:]) + 1
+    steps = steps[~np.isin(steps + 1, unsure)]
+    before, at, after = (p1[steps + k] for k in (-1, 0, 1))
+    whole = np.abs(after - before)
+    large = whole > LARGE * noise
+    soon = large & (np.abs(at - before) > FORESEEN * whole)
+    return bool(soon.sum() >= max(LEAST_SOON, LEAST_SHARE * large.sum()))
 
 
 def steps_kept(x: Array, noise: float) -> tuple[float, ...]:

@@ -8,6 +8,7 @@ import math
 import numpy as np
 from scipy.optimize import least_squares
 
+from ..model.effects.dwell_friction import SHAPES
 from ..model.pipeline import Array
 from .bench import Bench
 from .readings import answers_to_steps
@@ -82,11 +83,11 @@ def dwell_seen(bench: Bench, results: Sequence[Array]) -> list[dict[str, float]]
     if rest.size < LEAST_LEFT:
         return []
     found = []
-    for shape in (0.0, 1.0):
+    for shape in SHAPES:
         best, least = {}, math.inf
         for time_constant in DWELLS:
             part = rest / time_constant
-            grown = part / (1.0 + part) if shape else 1.0 - np.exp(-part)
+            grown = 1.0 - ((1.0 + shape * part) ** (-1.0 / shape) if shape else np.exp(-part))
 
             def missing(level: Array, grown: Array = grown) -> Array:
                 return level[0] + level[1] * grown - force

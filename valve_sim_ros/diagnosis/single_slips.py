@@ -1,22 +1,26 @@
 # Copyright 2026 The valve_sim_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Effects whose law hangs on every slip, fitted to single slips first."""
+"""Valves and effects whose law hangs on every slip, fitted to single slips first."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import cache
 from itertools import product
 
+from ..model.effects import CATALOGUE
 from . import odds
 from .adequacy import Leftover, leftover
 from .fitting import by_cost, eased, FINE, Fitter, GENERATIONS, Problem, SHORT, Valve
-from .starts import STEMS
+from .starts import nearby, STEMS
 from .stretch import CAUGHT, PUT_TO_REST, RESTS
 
 BEGUN, DESCENT, FOLLOWED, TURNS, FINEST = 8, 12, 3, 25, 0.3
 """So many starts are led to single slips; steps of that descent; so many of its ends are taken on
 to all slips, by evolutions of so many generations that begin with so little spread [steps of
 unknowns]."""
+FINENESS, SCATTERS = 11, 4
+"""Binary logarithm of how many are scattered around the best of them, caught, if none of these
+explains all; and how many of those are taken on."""
 FAR_OFF = 1.0
 """Excess of a caught stem beyond which it is not worth while to let it go, if the effect does not
 mostly explain x either."""
@@ -44,11 +48,13 @@ def slip_by_slip(
 
     @cache
     def plain(drive: tuple[str, ...]) -> Leftover:
-        """Return what the valve leaves without the effect."""
-        without = replace(valve, effects=valve.effects[:-1], candidates=valve.candidates[:-1])
+        """Return what the valve leaves without the effect that is sought, if one is."""
+        effects = valve.effects[:-1] if valve.candidates else valve.effects
+        without = replace(valve, effects=effects, candidates=valve.candidates[:-1])
         return leftover(fitter.residuals(without, signal, drive))
 
-    for there in each[:FOLLOWED]:
+    def led(there: Valve) -> Leftover:
+        """Lead a valve on to all slips; return what it leaves where that ended."""
         for way in eased(problem):
             # single slips hardly tell the law: it is found where their moments hardly count
             first = CAUGHT in way[2]
@@ -57,9 +63,17 @@ def slip_by_slip(
             there = fitter.fit(more, way, DESCENT)
             left = leftover(fitter.residuals(there, signal, way[2]))
             if left.excess > FAR_OFF and plain(way[2]).closed_by(left) < odds.MOSTLY:
+                return left
+        found.append(fitter.fit(there, problem, DESCENT))
+        return left
+
+    for there in each[:FOLLOWED]:
+        if led(there).excess <= odds.CLEAN:
+            return found
+    if valve.candidates and CATALOGUE[valve.candidates[-1].effect].rugged:
+        caught = eased(problem)[0]
+        scattered = nearby(each[0].values, unknowns, FINENESS)
+        for there in fitter.scan(each[0], scattered, caught, SCATTERS):
+            if led(there).excess <= odds.CLEAN:
                 break
-        else:
-            found.append(fitter.fit(there, problem, DESCENT))
-        if left.excess <= odds.CLEAN:
-            break
     return found

@@ -3,13 +3,21 @@
 """Groups of stages between measured signals, and the effects that may act in each."""
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 import math
 
 from ..model.declarations import EffectParameter
 from ..model.effects import CATALOGUE
-from .unknowns import BASE_UNKNOWNS, declared, of_effect, PHASE, start_of, Unknown
+from .unknowns import (
+    BASE_UNKNOWNS,
+    declared,
+    of_effect,
+    PHASE,
+    QUICKEST_BEHIND_LAGS,
+    start_of,
+    Unknown,
+)
 
 STAGE_OF = {'p1': 'u-p1', 'p2': 'p1-p2', 'x': 'p2-x'}
 
@@ -106,6 +114,9 @@ class Group:
     def unknowns(self, stretches: int, phase: Unknown = PHASE) -> tuple[Unknown, ...]:
         """Return what a fit of the base valve varies here."""
         base = [unknown for stage in self.stages for unknown in BASE_UNKNOWNS[stage]]
+        if len(self.stages) > 1:
+            slower = {'a_1/a_2': QUICKEST_BEHIND_LAGS}
+            base = [replace(each, upper=slower.get(each.name, each.upper)) for each in base]
         # p1 alone shows only whether a command came before the sample
         if self.stages != ('p2-x',) and not (self.stages == ('u-p1',) and phase.lower < 0.0):
             base.append(phase)

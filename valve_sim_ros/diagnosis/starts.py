@@ -5,6 +5,9 @@
 from collections.abc import Mapping, Sequence
 from itertools import product
 
+import numpy as np
+from scipy.stats import qmc
+
 from .unknowns import Unknown
 
 START: dict[str, float] = {
@@ -16,6 +19,7 @@ START: dict[str, float] = {
     'a_1/a_2': 12.0,
     'damping': 1.8,
     'phase': 0.0,
+    'blend': 0.0,
 }
 GRID: dict[str, tuple[float, ...]] = {
     'f_d1': (0.1, 0.5, 1.5, 4.0),
@@ -42,13 +46,20 @@ SWEEP = tuple(
     for damping in (0.25, 0.5, 1.0, 3.0)
 )
 """Stems of all kinds: from one that swings into one that creeps, no fit leads."""
-NEARBY: dict[str, tuple[float, ...]] = {
-    'f_s': (0.8, 0.9, 1.0, 1.1, 1.2, 1.35, 1.6),
-    'f_d/f_s': (0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9),
-    'lags': (0.85, 0.92, 1.0, 1.08, 1.17),
+NEARBY: dict[str, tuple[float, float]] = {
+    'f_s': (0.85, 1.3),
+    'f_d1': (0.7, 1.4),
+    'T_g1': (0.92, 1.08),
+    'T_g2': (0.92, 1.08),
 }
-"""Where a valve that slips lies from one that creeps and fits best: times its f_s and its lags,
-and shares of friction. The valley between them is long, narrow and bent."""
+ANY_STEM: dict[str, tuple[float, float]] = {
+    'f_d/f_s': (0.2, 0.95),
+    'a_1/a_2': (8.0, 80.0),
+    'damping': (0.15, 2.0),
+}
+ANY_SIZE = 0.3, 3.0
+"""Where a valve that slips lies from one that creeps and fits best: times its values, its stem,
+and times the parameters of its effects. The valley between them is long, narrow and bent."""
 AROUND = (0.9, 1.0)
 """Shares of the friction that the data show from which a search starts."""
 
@@ -60,20 +71,24 @@ def grid(unknowns: Sequence[Unknown]) -> list[dict[str, float]]:
     return [dict(zip(names, point, strict=True)) for point in product(*(values[n] for n in names))]
 
 
-def nearby(values: Mapping[str, float]) -> list[dict[str, float]]:
-    """Return starts around a valve that fits x alone, of all kinds of stems and frictions."""
-    return [
-        {
-            **values,
-            **stem,
-            'f_s': f_s * values['f_s'],
-            'f_d/f_s': share,
-            'T_g1': lag * values['T_g1'],
-            'T_g2': lag * values['T_g2'],
-        }
-        for f_s, share, lag in product(*NEARBY.values())
-        for stem in SWEEP
-    ]
+def nearby(
+    values: Mapping[str, float], unknowns: Sequence[Unknown], fineness: int
+) -> list[dict[str, float]]:
+    """Return 2 to the `fineness` starts around a valve, scattered evenly.
+
+    Their frictions, lags, stems and parameters of effects differ.
+    """
+    spans = {}
+    for name in (unknown.name for unknown in unknowns):
+        if name in ANY_STEM:
+            spans[name] = ANY_STEM[name]
+        elif (name in NEARBY or '.' in name) and values[name] > 0.0:
+            low, high = NEARBY.get(name, ANY_SIZE)
+            spans[name] = low * values[name], high * values[name]
+    low, high = np.log(list(spans.values())).T
+    points = qmc.Sobol(len(spans), scramble=False).random_base2(fineness)
+    each = np.exp(low + points * (high - low)).tolist()
+    return [{**values, **dict(zip(spans, point, strict=True))} for point in each]
 
 
 def friction_grid(seen: float) -> list[dict[str, float]]:

@@ -20,6 +20,8 @@ from there, which leaves a right valve alone; the same, while slips must come at
 and at every moment."""
 PUT_TO_REST = {RESTS, CAUGHT, ON_TIME}
 STEM = OUTPUTS.index('x')
+EARLIEST, LATEST = -0.9999, 0.999
+"""By how much a command came sooner than the sample that shows it, at least and most [periods]."""
 MOVES = 4.0
 """What begins by more than this within two samples moves [noise]."""
 Rows = npt.NDArray[np.intp]
@@ -51,7 +53,8 @@ class Stretch:
     measured. `speed` is that of a stem that moves at the beginning [%/s], `held` is x smoothed
     between its slips. `shown` are the commands of the recording, where `u` are those that the
     valve is taken to have received; nobody knows whether the steps at the samples `unsure` came
-    with a command that was lost just before.
+    with a command that was lost just before. `sooner` is by how much sooner than the others the
+    command of a sample came [periods].
     """
 
     time: Array
@@ -64,11 +67,12 @@ class Stretch:
     speed: float = 0.0
     held: Array = field(default_factory=lambda: np.empty(0))
     unsure: Rows = field(default_factory=lambda: np.empty(0, dtype=np.intp))
+    sooner: Array = field(default_factory=lambda: np.empty(0))
     _grids: dict[Any, Grid] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         """Keep the commands as the recording shows them."""
-        self.shown = self.u
+        self.shown, self.sooner = self.u, np.zeros(self.u.size)
 
     @cached_property
     def first(self) -> dict[str, float]:
@@ -83,13 +87,14 @@ class Stretch:
             found[name] = fallback
         return found
 
-    def grid(self, phase: float, drive: tuple[str, ...]) -> Grid:
+    def grid(self, phase: float, drive: tuple[str, ...], blend: float = 0.0) -> Grid:
         """Return the stretch with the commands moved by a share of a period.
 
         With `phase` > 0 a change of u that the recording shows at a sample came that share of a
-        period earlier, with `phase` < 0 later.
+        period earlier, with `phase` < 0 later. A command that goes on and on may be late by the
+        share `blend` of a period: what the valve then receives lies between two samples.
         """
-        key = round(phase, 4), drive
+        key = round(phase, 4), drive, round(blend, 4)
         found = self._grids.get(key)  # other threads may clear them meanwhile
         if found is None:
             if len(self._grids) > KEPT_GRIDS:
@@ -107,6 +112,12 @@ class Stretch:
         self.u = u
         self._grids.clear()
 
+    def scatter(self, steps: Rows, sooner: Array) -> None:
+        """Let steps of the command come sooner or later than the others [periods]."""
+        self.sooner = np.zeros(self.u.size)
+        self.sooner[steps] = sooner
+        self._grids.clear()
+
     def put(self, steps: Rows, sooner: bool) -> None:
         """Let steps of the command come a sample earlier or later, unseen in p1 there."""
         self.hide(steps - sooner)
@@ -120,20 +131,17 @@ class Stretch:
                 each['p1'] = each['p1'].copy()
                 each['p1'][rows[rows < self.time.size]] = np.nan
 
-    def _moved(self, phase: float, drive: tuple[str, ...]) -> Grid:
+    def _moved(self, phase: float, drive: tuple[str, ...], blend: float) -> Grid:
         n = self.time.size
-        changed = np.flatnonzero(np.diff(self.u)) + 1
-        seen = self.u
-        if phase > 0.0:
-            extra = self.time[changed] - phase * (self.time[changed] - self.time[changed - 1])
-        elif phase < 0.0:
-            seen = np.concatenate([self.u[:1], self.u[:-1]])
-            step = np.diff(self.time, append=2 * self.time[-1] - self.time[-2])
-            extra = self.time[changed] - phase * step[changed]
-        else:
-            changed, extra = changed[:0], self.time[:0]
-        time = np.concatenate([self.time, extra])
+        sent = blended(self.u, blend) if blend else self.u
+        changed = np.flatnonzero(np.diff(sent)) + 1
+        each = np.clip(phase + self.sooner[changed], EARLIEST, LATEST)
+        periods = np.diff(self.time, append=2 * self.time[-1] - self.time[-2])
+        came = self.time[changed] - each * np.where(each > 0.0, *periods[[changed - 1, changed]])
+        came = np.maximum.accumulate(came)
+        time = np.concatenate([self.time, came[each != 0.0]])
         order = np.argsort(time, kind='stable')
+        received = np.searchsorted(came, time[order], 'right')
         rows = np.empty(time.size, dtype=np.intp)
         rows[order] = np.arange(time.size)
         rows = rows[:n]
@@ -156,7 +164,7 @@ class Stretch:
         steps: Array = np.diff(time[order], prepend=time[order][:1])
         steps = np.round(steps, 9)  # equal steps stay equal
         return Grid(
-            np.concatenate([seen, self.u[changed]])[order],
+            np.concatenate([sent[:1], sent[changed]])[received],
             steps,
             rows,
             forced,
@@ -164,6 +172,14 @@ class Stretch:
             scales,
             nothing,
         )
+
+
+def blended(u: Array, share: float) -> Array:
+    """Return commands that go on from sample to sample late by a share of a period."""
+    moves = np.diff(u, prepend=u[:1]) != 0.0
+    beside = np.concatenate([[False], moves, [False]])
+    on = moves & (beside[:-2] | beside[2:])
+    return np.where(on, (1.0 - share) * u + share * np.concatenate([u[:1], u[:-1]]), u)
 
 
 def shifted(u: Array, steps: Rows, sooner: bool) -> Array:

@@ -47,6 +47,8 @@ def _log(name: str, lower: float, upper: float, step: float = 0.05) -> Unknown:
 SLOWEST = 2.0
 """A stem that lags by more than half a second is called a lag of its sensor, or of the converter:
 real ones, and that of the paper, are quicker (a_1/a_2 = 2.9 and 12.2 1/s) [1/s]."""
+QUICKEST, QUICKEST_BEHIND_LAGS = 200.0, 80.0
+"""Stems are no quicker, nor sought quicker where lags are sought with them [1/s]."""
 
 BASE_UNKNOWNS: dict[str, tuple[Unknown, ...]] = {
     'u-p1': (Unknown('f_d1', 0.0, DECLARED['f_d1'].upper, 'linear', 0.05),),
@@ -54,7 +56,7 @@ BASE_UNKNOWNS: dict[str, tuple[Unknown, ...]] = {
     'p2-x': (
         _log('f_s', 0.01, DECLARED['f_s'].upper),
         Unknown('f_d/f_s', 0.0, 1.0, 'linear', 0.03),
-        _log('a_1/a_2', SLOWEST, 80.0, 0.1),
+        _log('a_1/a_2', SLOWEST, QUICKEST, 0.1),
         _log('damping', 0.1, 5.0, 0.1),
     ),
 }
@@ -63,6 +65,8 @@ PHASE = Unknown('phase', -1.0, 0.999, 'linear', 0.1)
 """Share of a sample period by which a command acts before the sample that shows it."""
 EARLY = Unknown('phase', 0.0, 0.999, 'linear', 0.1)
 LATE = Unknown('phase', -1.0, -0.001, 'linear', 0.1)
+BLEND = Unknown('blend', 0.0, 0.999, 'linear', 0.1)
+"""Share of a period by which a command that goes on and on reaches p1 late."""
 
 
 def start_of(name: str) -> Unknown:

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """One pool for the runs of a search: compiled runs release the lock."""
 
+from bisect import insort
 from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
 import math
@@ -30,12 +31,12 @@ def cheapest(
 
     `cost` may stop counting at its second argument.
     """
-    known: list[float] = []
+    least: list[float] = []
 
     def counted(item: Item) -> float:
-        least = sorted(known)[:count]
-        found = cost(item, min(bound, least[-1]) if len(least) == count else bound)
-        known.append(found)
+        found = cost(item, min(bound, least[count - 1]) if len(least) >= count else bound)
+        insort(least, found)
+        del least[count:]
         return found
 
     return at_once(counted, items)

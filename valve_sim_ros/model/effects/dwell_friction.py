@@ -13,6 +13,8 @@ from ..stem import Friction
 
 EXPONENTIAL = 1e-3
 """Shape below which the growth is as good as exponential."""
+SHAPES = (0.0, 1.0, 8.0)
+"""Shapes from which a search starts: exponential, rational, and hardly coming to an end."""
 
 
 @njit
@@ -76,10 +78,10 @@ EFFECT = Effect(
             '-',
             0.0,
             0.0,
-            1.0,
+            20.0,
             'linear',
-            '0: 1 - exp(-t/tau); 1: t/(t + tau); between: 1 - (1 + c t/tau)^(-1/c)',
-            starts=(1.0,),
+            '0: 1 - exp(-t/tau); 1: t/(t + tau); else 1 - (1 + c t/tau)^(-1/c); 20: as log t',
+            starts=SHAPES[1:],
         ),
     ),
     slots={'force_slot': force, 'motion_slot': motion},
@@ -98,5 +100,6 @@ EFFECT = Effect(
     },
     references=(
         'Rising static friction t/(t + tau), Armstrong-Helouvry, Dupont, Canudas de Wit 1994',
+        'Static friction grows with log t, Dieterich 1972, doi:10.1029/JB077i020p03690',
     ),
 )

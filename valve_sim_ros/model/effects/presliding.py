@@ -1,6 +1,6 @@
 # Copyright 2026 The valve_sim_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Elastic motion of the stem below breakaway (LuGre bristles)."""
+"""Elastic motion of the stem below breakaway: bristles that slide (LuGre) or that break."""
 
 import math
 from typing import Any, NamedTuple
@@ -8,8 +8,9 @@ from typing import Any, NamedTuple
 from numba import njit
 
 from ..declarations import Effect, EffectParameter
+from ..slip import forced_gain, stem_poles
 from ..state import Motion, moved
-from ..stem import Friction, Stem, visible
+from ..stem import Friction, Stem, through_events, visible
 
 STIFFEST = 200.0
 """Bristles are not stiffer than this, relative to the spring: their travel is then not seen."""
@@ -38,7 +39,7 @@ class Bristles(NamedTuple):
 def motion(value: Any, state: Any, p: Any, memory: Any, dt: float) -> Motion:
     """Replace the step of the stem by short ones with bristles (classical Runge-Kutta)."""
     if p[0] <= 0.0:
-        return value
+        return held(value, state, p[2], dt) if p[2] > 0.0 and state.direction == 0.0 else value
     friction, theta = value.friction, value.theta
     stiffness = min(1.0 / p[0], STIFFEST)
     inertia, damping = visible(theta.a_1, theta.a_2)
@@ -68,6 +69,45 @@ def motion(value: Any, state: Any, p: Any, memory: Any, dt: float) -> Motion:
         now = end
     memory[0] = z
     return moved(value, Stem(x, v, 0.0, False), value.p2)
+
+
+@njit
+def held(value: Any, state: Any, compliance: float, dt: float) -> Motion:
+    """Repeat the step of a resting stem that gives way, in proportion, until its hold breaks."""
+    f, theta, target, excess, rate = (
+        value.friction,
+        value.theta,
+        value.target,
+        value.excess,
+        value.rate,
+    )
+    begin, end = target + excess, target + excess * math.exp(-rate * dt)
+    # the stem follows the pressure, and its spring takes a part of that
+    softer = 1.0 + f.stiffness * compliance
+    force = begin - f.stiffness * state.x
+    level, wait, direction = end, 0.0, 0.0
+    if not -f.static_down <= force <= f.static_up:
+        level, direction = begin, math.copysign(1.0, force)
+    elif end > begin + (f.static_up - force) * softer:
+        level, direction = begin + (f.static_up - force) * softer, 1.0
+    elif end < begin - (f.static_down + force) * softer:
+        level, direction = begin - (f.static_down + force) * softer, -1.0
+    x = state.x + compliance / softer * (level - begin)
+    if direction == 0.0:
+        return moved(value, Stem(x, 0.0, 0.0, False), value.p2)
+    if level != begin:
+        wait = -math.log((level - target) / excess) / rate
+    stem = through_events(
+        Stem(x, 0.0, direction, False),
+        target,
+        level - target,
+        dt - wait,
+        f,
+        theta.delta,
+        forced_gain(rate, theta.a_1, theta.a_2, f.stiffness),
+        stem_poles(theta.a_1 * f.stiffness, theta.a_2),
+    )
+    return moved(value, stem, value.p2)
 
 
 @njit(forceinline=True)
@@ -114,6 +154,19 @@ EFFECT = Effect(
             neutral=0.1,
             starts=(0.1,),
         ),
+        EffectParameter(
+            'stuck_compliance',
+            'c',
+            '-',
+            0.0,
+            0.0,
+            3.0,
+            'linear',
+            'The same if the packing gives way in proportion until its hold breaks',
+            starts=(0.06, 0.2, 0.5),
+            usual=(0.03, 1.2),
+            step=0.02,
+        ),
     ),
     slots={'motion_slot': motion},
     memory=1,
@@ -121,6 +174,7 @@ EFFECT = Effect(
     explanation='The packing gives way elastically before the stem breaks away.',
     symptom='Micro-motion below f_s, minor loops, and no clean stick.',
     confirm='Small reversals below the breakaway force, with a fine position sensor.',
+    variants=(('compliance', 'drop_speed'), ('stuck_compliance',)),
     laborious=True,
     twins={
         'sensor_quantisation': 'small steps of a coarse sensor hide micro-motion: finer sensor',
