@@ -115,12 +115,10 @@ def climb(
         return rest if rest.excess <= odds.SPOTLESS and rest.far < odds.MORE_FAR else left
 
     def sought(left: Leftover) -> Sequence[Candidate]:
-        if left is chance:
-            return ()
-        if worth(left):
+        if left is not chance and worth(left):
             return candidates
         hidden = group.stages == ('p2-x',) and not (rungs or named or carried > odds.SPOTLESS)
-        stepped = not rungs and bool(fitter.bench.steps_of_x)
+        stepped = not (rungs or left is chance) and bool(fitter.bench.steps_of_x)
         return [
             each
             for each in candidates
@@ -285,7 +283,10 @@ def concluded(ladder: Ladder) -> Ladder:
     """Return the ladder with its outcome: names only if together they explain the gap."""
     names = [rung.effect for rung in ladder.rungs]
     signal = ladder.group.signal
-    if names and odds.explained(signal, ladder.before, ladder.after, names):
+    # next to nothing is left to close where the base valve imitates it
+    hidden = all(odds.imitates(ladder.base, name) for name in names)
+    spotless = hidden and ladder.after.excess <= odds.SPOTLESS
+    if names and (spotless or odds.explained(signal, ladder.before, ladder.after, names)):
         return replace(ladder, outcome='missing_effect')
     # what does not explain the gap is not left in the valve either
     unknown = ladder.before.excess > odds.ADEQUATE[signal]

@@ -16,6 +16,8 @@ ENOUGH = 25.0
 MORE_ENOUGH, MORE_EXCESS, MORE_CLOSED = 60.0, 0.15, 0.6
 """What a further effect needs: gain (any effect, where the base valve leaves no least excess),
 excess before it, and the part of it that it closes."""
+NO_DROP = 0.97
+"""Kinetic over static friction beyond which a base valve is odd: its friction hardly falls."""
 MORE_SHARE, FAR_OFF = 0.02, 2.0
 """Least part of the whole gap that it closes, unless it leaves nothing but noise; the excess that
 is far more than noise: it may close less of that, if both together explain the gap."""
@@ -190,6 +192,11 @@ def explained(signal: str, before: Leftover, after: Leftover, names: Collection[
     else:
         least = EXPLAINED[signal] if len(names) == 1 else EXPLAINED_BY_TWO
     return before.closed_by(after) >= least
+
+
+def imitates(base: Valve, effect: str) -> bool:
+    """Tell whether a base valve without any drop of friction passes for one with an effect."""
+    return CATALOGUE[effect].imitated and base.values['f_d/f_s'] > NO_DROP
 
 
 def look_alike(one: str, other: str) -> bool:

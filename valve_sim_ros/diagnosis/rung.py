@@ -69,7 +69,9 @@ def judged(
     change = before.mean_square - after.mean_square
     least = odds.LEAST_SHIFT if candidate.effect in odds.LASTING else odds.LEAST_CHANGE
     little = before.excess < odds.LEAST_EXCESS[group.signal]
-    enough = odds.MORE_ENOUGH if little else odds.ENOUGH
+    hidden = odds.imitates(now, candidate.effect)
+    enough = odds.MORE_ENOUGH if little and not hidden else odds.ENOUGH
+    least = 0.0 if hidden else least
     # where a few far errors were the only reason to look, they must be gone
     only_far = little and min(before.far, after.far) >= odds.LEAST_FAR
     # what has the colour of noise is misfit only where an effect takes it away

@@ -67,13 +67,17 @@ def slip_by_slip(
         found.append(fitter.fit(there, problem, DESCENT))
         return left
 
+    effect = CATALOGUE[valve.candidates[-1].effect] if valve.candidates else None
+    if effect and effect.imitated:  # where the base valve leaves nothing, single slips do not lead
+        scattered = nearby(each[0].values, unknowns, FINENESS)
+        near = fitter.scan(each[0], scattered, problem, SCATTERS)
+        found += [fitter.fit(there, problem, DESCENT) for there in near]
     for there in each[:FOLLOWED]:
         if led(there).excess <= odds.CLEAN:
             return found
-    if valve.candidates and CATALOGUE[valve.candidates[-1].effect].rugged:
-        caught = eased(problem)[0]
+    if effect and effect.rugged:
         scattered = nearby(each[0].values, unknowns, FINENESS)
-        for there in fitter.scan(each[0], scattered, caught, SCATTERS):
+        for there in fitter.scan(each[0], scattered, eased(problem)[0], SCATTERS):
             if led(there).excess <= odds.CLEAN:
                 break
     return found
