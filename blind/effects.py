@@ -150,8 +150,9 @@ def position_dependent_friction(rng: Rng, valve: Physics, length: float) -> Chan
 
 
 def stribeck_friction(rng: Rng, valve: Physics, length: float) -> Changes:
-    """Let friction fall with speed instead of at once."""
-    return {'stribeck': log_uniform(rng, 0.5, 30.0)}
+    """Let friction fall with speed instead of at once, along a Gaussian or an exponential."""
+    power = 2.0 if rng.random() < 0.7 else 1.0
+    return {'stribeck': log_uniform(rng, 0.5, 30.0), 'stribeck_power': power}
 
 
 def presliding(rng: Rng, valve: Physics, length: float) -> Changes:
@@ -176,9 +177,12 @@ def dwell_friction(rng: Rng, valve: Physics, length: float) -> Changes:
 
 
 def friction_drift(rng: Rng, valve: Physics, length: float) -> Changes:
-    """Let friction grow or shrink through the record."""
+    """Let friction grow or shrink through the record, or settle while the valve warms up."""
     end = rng.uniform(1.3, 3.0) if rng.random() < 0.7 else rng.uniform(0.4, 0.75)
-    return {'friction_drift': (end - 1.0) / length}
+    if rng.random() < 0.7:
+        return {'friction_drift': (end - 1.0) / length}
+    warm_up = rng.uniform(0.15, 0.4) * length
+    return {'friction_drift': (end - 1.0) / warm_up, 'friction_warm_up': warm_up}
 
 
 def spring_preload(rng: Rng, valve: Physics, length: float) -> Changes:

@@ -63,6 +63,7 @@ class Physics(NamedTuple):
     bump_at: float = 50.0
     bump_width: float = 10.0
     stribeck: float = 0.0
+    stribeck_power: float = 2.0
     bristle: float = 0.0
     bristle_damping: float = 0.0
     bristle_stribeck: float = 0.02
@@ -73,6 +74,7 @@ class Physics(NamedTuple):
     dwell_rational: float = 0.0
     dwell_decade: float = 0.0
     friction_drift: float = 0.0
+    friction_warm_up: float = 0.0
     # forces on the stem, and its limits
     preload: float = 0.0
     spring_rate: float = 1.0

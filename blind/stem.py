@@ -47,7 +47,10 @@ def contact(x, q):
 @numba.njit
 def friction_scale(direction, x, q, t):
     """Return the factor on both friction levels here and now."""
-    scale = (1.0 + q.asymmetry * direction) * (1.0 + q.friction_drift * max(t, 0.0))
+    since = max(t, 0.0)
+    if q.friction_warm_up > 0.0:
+        since = q.friction_warm_up * (1.0 - exp(-since / q.friction_warm_up))
+    scale = (1.0 + q.asymmetry * direction) * (1.0 + q.friction_drift * since)
     scale *= 1.0 + q.friction_slope * 0.01 * min(max(x, 0.0), 100.0)
     if q.bump > 0.0:
         scale *= 1.0 + q.bump * exp(-(((x - q.bump_at) / q.bump_width) ** 2))
@@ -81,7 +84,7 @@ def coulomb(force, s, q, h, t):
         s[at.REST] = 0.0
     level = q.f_d
     if q.stribeck > 0.0:
-        level += (q.f_s - q.f_d) * exp(-((v / q.stribeck) ** 2))
+        level += (q.f_s - q.f_d) * exp(-(abs(v / q.stribeck) ** q.stribeck_power))
     new = (v + h * q.a_1 * (force - direction * scale * level)) / (1.0 + h * q.a_2)
     if new * direction <= (q.delta if v != 0.0 else 0.0):
         return 0.0

@@ -95,6 +95,11 @@ OTHER_FORMS = [
         {'bristle': 4.0, 'bristle_stribeck': 0.03},
         {'compliance': 0.25, 'drop_speed': 0.03},
     ),
+    (
+        'stribeck_friction',
+        {'stribeck': 8.0, 'stribeck_power': 1.0},
+        {'velocity': 8.0, 'exponent': 1.0},
+    ),
     ('presliding', {'brittle': 5.0}, {'compliance': 0.0, 'stuck_compliance': 0.2}),
     (
         'nonlinear_flow',
@@ -172,6 +177,11 @@ OTHER_FORMS = [
         'dwell_friction',
         {'dwell_decade': 0.3, 'dwell_time': 5.0},
         {'growth': 3.0, 'time_constant': 127.7, 'shape': 20.0},
+    ),
+    (
+        'friction_drift',
+        {'friction_drift': 0.01, 'friction_warm_up': 60.0},
+        {'rate': 36.0, 'settling': 60.0},
     ),
     (
         'sensor_drift',

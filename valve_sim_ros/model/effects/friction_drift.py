@@ -7,14 +7,15 @@ from typing import Any
 from numba import njit
 
 from ..declarations import Effect, EffectParameter
+from ..drift import drifted, SETTLING
 from ..stem import Friction
 
 
 @njit
 def force(value: Any, state: Any, p: Any, memory: Any, dt: float) -> tuple[float, Friction]:
-    """Return friction times 1 + k t."""
+    """Return friction times 1 + r t, or what that settles to."""
     offset, f = value
-    factor = max(1.0 + p[0] * state.time / 3600.0, 0.02)
+    factor = max(1.0 + p[0] * drifted(state.time, p[1]), 0.02)
     return offset, Friction(
         f.static_up * factor,
         f.static_down * factor,
@@ -31,7 +32,7 @@ EFFECT = Effect(
     parameters=(
         EffectParameter(
             'rate',
-            'k',
+            'r',
             '1/h',
             1.0,
             -60.0,
@@ -40,7 +41,9 @@ EFFECT = Effect(
             'Relative change of friction per hour',
             starts=(-3.0, -1.0, 1.0, 3.0, 7.0),
         ),
+        SETTLING,
     ),
+    variants=(('rate',), ('rate', 'settling')),
     slots={'force_slot': force},
     order=20,
     explanation='The packing wears, dries out, warms up or was tightened during the record.',

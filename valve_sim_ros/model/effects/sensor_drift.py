@@ -2,21 +2,18 @@
 # SPDX-License-Identifier: Apache-2.0
 """Zero of the position sensor that drifts."""
 
-import math
 from typing import Any
 
 from numba import njit
 
 from ..declarations import Effect, EffectParameter
+from ..drift import drifted, SETTLING
 
 
 @njit
 def sensor(value: float, state: Any, p: Any, memory: Any, dt: float) -> float:
     """Return x with the drift so far: r t, or r (1 - exp(-k t))/k if it settles."""
-    hours = state.time / 3600.0
-    if p[1] > 0.0:
-        hours = -math.expm1(-p[1] * hours) / p[1]
-    return value + p[0] * hours
+    return value + p[0] * drifted(state.time, p[1])
 
 
 EFFECT = Effect(
@@ -35,17 +32,7 @@ EFFECT = Effect(
             'Drift of measured x per hour',
             starts=(-25.0, -8.0, 8.0, 25.0),
         ),
-        EffectParameter(
-            'settling',
-            'k',
-            '1/h',
-            0.0,
-            0.0,
-            100.0,
-            'linear',
-            'Rate at which the drift settles, as of a transmitter that warms up',
-            starts=(10.0,),
-        ),
+        SETTLING,
     ),
     variants=(('rate',), ('rate', 'settling')),
     slots={'sensor_slot': sensor},

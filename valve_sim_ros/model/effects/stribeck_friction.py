@@ -20,12 +20,15 @@ LESS, MORE, SAFE = 0.3, 3.0, 0.8
 LEAST, NOTHING = 0.05, 1e-9
 """Part of a step that a stem takes at least to stop, and the time left [s] that is none: a stem
 that cannot start must not hang."""
-FAST = 5.0
-"""Speed beyond which nothing of f_s - f_d is left [v_s]."""
+FAST, GAUSSIAN = 25.0, 2.0
+"""Power of the speed [v_s] beyond which nothing of f_s - f_d is left, and the usual exponent."""
 
 
 class Slipping(NamedTuple):
-    """A stem that slips: direction, k/m [1/s^2], F_v/m [1/s], stiffness, levels [%], v_s [%/s]."""
+    """A stem that slips.
+
+    Direction, k/m [1/s^2], F_v/m [1/s], stiffness, levels [%], v_s [%/s], exponent.
+    """
 
     direction: float
     a_1: float
@@ -34,6 +37,7 @@ class Slipping(NamedTuple):
     level: float
     rise: float
     fall: float
+    exponent: float
 
 
 @njit
@@ -50,7 +54,7 @@ def motion(value: Any, state: Any, p: Any, memory: Any, dt: float) -> Motion:
     a_1, a_2 = visible(theta.a_1, theta.a_2)
     fastest = max(a_2, math.sqrt(a_1 * f.stiffness))
     stem = Stem(state.x, state.v, state.direction, state.armed != 0.0)
-    slip = slipping(stem.direction, f, a_1, a_2, p[0])
+    slip = slipping(stem.direction, f, a_1, a_2, p)
     excess, left, longest = value.excess, dt, STABLE / fastest
     h = longest
     while left > NOTHING:
@@ -60,7 +64,7 @@ def motion(value: Any, state: Any, p: Any, memory: Any, dt: float) -> Motion:
                 break
             left -= wait
             stem = Stem(stem.x, 0.0, direction, False)
-            slip = slipping(direction, f, a_1, a_2, p[0])
+            slip = slipping(direction, f, a_1, a_2, p)
             h = FIRST / fastest
         h = min(h, left)
         decay = math.exp(-0.5 * rate * h)
@@ -76,12 +80,12 @@ def motion(value: Any, state: Any, p: Any, memory: Any, dt: float) -> Motion:
 
 
 @njit
-def slipping(direction: float, f: Friction, a_1: float, a_2: float, fall: float) -> Slipping:
+def slipping(direction: float, f: Friction, a_1: float, a_2: float, p: Any) -> Slipping:
     """Return the constants of a slip."""
     level, rise = f.dynamic_up, f.static_up - f.dynamic_up
     if direction < 0.0:
         level, rise = f.dynamic_down, f.static_down - f.dynamic_down
-    return Slipping(direction, a_1, a_2, f.stiffness, level, rise, fall)
+    return Slipping(direction, a_1, a_2, f.stiffness, level, rise, p[0], p[1])
 
 
 @njit
@@ -121,10 +125,10 @@ def slipped(
 @njit(forceinline=True)
 def acceleration(p2: float, x: float, v: float, slip: Slipping) -> float:
     """Return the acceleration of a slipping stem [%/s^2]."""
-    ratio = v / slip.fall
-    level = slip.level
-    if abs(ratio) < FAST:
-        level += slip.rise * math.exp(-ratio * ratio)
+    power, level = v / slip.fall, slip.level
+    power = power * power if slip.exponent == GAUSSIAN else abs(power) ** slip.exponent
+    if power < FAST:
+        level += slip.rise * math.exp(-power)
     return slip.a_1 * (p2 - slip.stiffness * x - slip.direction * level) - slip.a_2 * v
 
 
@@ -145,7 +149,20 @@ EFFECT = Effect(
             starts=(1.0, 4.0, 15.0),
             usual=(0.5, 32.0),
         ),
+        EffectParameter(
+            'exponent',
+            'n',
+            '-',
+            GAUSSIAN,
+            0.5,
+            4.0,
+            'linear',
+            'of exp(-(v/v_s)^n): 2 Gaussian, 1 exponential',
+            neutral=GAUSSIAN,
+            starts=(1.0,),
+        ),
     ),
+    variants=(('velocity',), ('velocity', 'exponent')),
     slots={'motion_slot': motion},
     order=-20,
     explanation='A lubricated packing loses friction only as the stem picks up speed.',
@@ -157,5 +174,8 @@ EFFECT = Effect(
         'presliding': 'presliding shows as motion below f_s: small reversals',
         'dwell_friction': 'that one depends on the time at rest: steps after short and long rests',
     },
-    references=('models.md sec. 4.1; Armstrong-Helouvry, Dupont, Canudas de Wit 1994',),
+    references=(
+        'models.md sec. 4.1; Armstrong-Helouvry, Dupont, Canudas de Wit 1994',
+        'Exponent 0.5 to 1: Bo, Pavelescu 1982, Wear 82, 277-289',
+    ),
 )
