@@ -1,6 +1,6 @@
 # Copyright 2026 The valve_sim_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""On which side of a sample each command came, where p1 does not show it."""
+"""When each command came, where p1 does not show it."""
 
 from collections.abc import Sequence
 import math
@@ -40,6 +40,8 @@ def put_in_its_period(fitter: Fitter, group: Group, valve: Valve, problem: Probl
     if group.has_stem or 'p1-p2' not in group.stages or 'p1' in problem[2]:
         return valve
     stretches = fitter.bench.stretches
+    if any(stretch.sooner.any() for stretch in stretches):
+        return valve  # told before
     sent = [stretch.u for stretch in stretches]
     each = shifts_of_steps(fitter, valve, problem)
     found_early = [
@@ -64,7 +66,7 @@ def put_in_its_period(fitter: Fitter, group: Group, valve: Valve, problem: Probl
             return fitter.refined(valve, problem)
         for stretch, u in zip(stretches, sent, strict=True):
             stretch.send(u)
-        return _when_they_came(fitter, group, valve, problem, each)
+        return _when_they_came(fitter, valve, problem, each)
     sooner = on_time > RARE * early
     for stretch, (steps, shifts, errors) in zip(stretches, each, strict=True):
         # those that are hardly told stay with the most
@@ -75,7 +77,6 @@ def put_in_its_period(fitter: Fitter, group: Group, valve: Valve, problem: Probl
 
 def _when_they_came(
     fitter: Fitter,
-    group: Group,
     valve: Valve,
     problem: Problem,
     told: Sequence[tuple[Rows, Array, Array]],
