@@ -37,10 +37,11 @@ def candidates(*effects):
     return [each for each in ALL.candidates() if each.effect in effects]
 
 
+@pytest.mark.slow
 def test_base_valves_are_found_at_the_end_of_a_narrow_valley():
     """A stem that creeps imitates one that slips: lags and friction change together in between.
 
-    So narrow is it that the noise decides whether a search hits it: half of eight were found.
+    So narrow is it that the noise decides whether a search hits it: 7 of draws 3 to 10 were found.
     """
     rng = np.random.default_rng(3)
     ends = np.concatenate([[40.0], rng.uniform(10.0, 90.0, 12)])
@@ -52,11 +53,11 @@ def test_base_valves_are_found_at_the_end_of_a_narrow_valley():
         noise = 0.2 * np.random.default_rng(seed).standard_normal(u.size)
         fitter = Fitter(Bench([Recording(s.t, u, x=s.x + noise)]))
         best = find_base(fitter, ALL, starting_valve(fitter.bench), ())
-        friction = [best.values[name] for name in ('f_s', 'f_d/f_s')]
+        near = [best.values[name] for name in ('T_g1', 'f_s')]
         # 2.0 for each sample where the stem creeps
-        return best.cost < u.size and friction == pytest.approx([4.57, 2.87 / 4.57], rel=0.05)
+        return best.cost < u.size and near == pytest.approx([5.0, 4.57], rel=0.1)
 
-    assert any(found(seed) for seed in (3, 8, 4, 5))
+    assert sum(found(seed) for seed in range(3, 7)) >= 2
 
 
 def test_a_rate_that_is_limited_one_way_is_found():
