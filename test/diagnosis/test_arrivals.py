@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Commands that come just when samples are taken."""
 
+import itertools
+
 import numpy as np
 import pytest
 
@@ -134,3 +136,23 @@ def test_a_swing_that_is_late_by_a_part_of_a_period_is_no_lag():
     found = diagnose([Recording(run.t[::10], u[::10], p1)])
     assert found.verdict == 'adequate'
     assert found.base_valve.values['blend'] == pytest.approx(0.3, abs=0.05)
+
+
+def test_commands_that_go_on_between_samples_are_no_effect_beside_steps():
+    """Ramps are followed between two samples, steps come with them."""
+    rng, fine = np.random.default_rng(2), 10
+    levels = rng.uniform(10.0, 90.0, 30)
+    pieces = [np.full(40 * fine, levels[0])]
+    for before, after in itertools.pairwise(levels):
+        size = int(rng.integers(20, 40)) * fine
+        pieces += [np.linspace(before, after, size + 1)[1:], np.full(size, after)]
+        pieces += [np.full(size, level) for level in rng.uniform(10.0, 90.0, 2)]
+        pieces += [np.full(size, after)]
+    u = np.concatenate(pieces)
+    run = simulate(u, 0.05, QUICK)
+    seen = slice(None, None, fine)
+    noisy = [each[seen] + 0.2 * rng.standard_normal(each[seen].size) for each in (run.p1, run.p2)]
+    found = diagnose([Recording(run.t[seen], u[seen], *noisy)])
+    assert found.verdict == 'adequate'
+    assert found.base_valve.values['lead'] == pytest.approx(0.45, abs=0.05)
+    assert found.ladders[1].before.excess < 0.05

@@ -14,7 +14,7 @@ from .seen import friction_seen, mixed_arrivals
 from .single_slips import slip_by_slip
 from .stages import Group
 from .starts import friction_grid, grid, nearby, START, STEMS, SWEEP
-from .unknowns import EARLY, LATE, PHASE, Unknown
+from .unknowns import BLEND, EARLY, LATE, LEAD, PHASE, Unknown
 
 FEW_STARTS = 3
 """So many starts are followed."""
@@ -24,8 +24,8 @@ where costs are rugged, and for how long; the binary logarithm of how many are s
 the best, and how many of them are followed."""
 NEARLY = 0.95
 """Phase beyond which a command acts nearly a whole period late or early."""
-BLENDS = (0.1, 0.3, 0.5, 0.7, 0.9)
-"""Parts of a period by which commands that go on and on may be late."""
+SHARES = (0.1, 0.3, 0.5, 0.7, 0.9)
+"""Parts of a period by which commands that go on and on may be late, or sooner than steps."""
 LAG, CLEARLY = 'ip_lag', 50.0
 """An answer that lags may have gone less than half the way where it is first seen: with it that
 sample must be told so much better."""
@@ -91,6 +91,8 @@ def find_base(
         best = fitter.refined(found[0], problem)
         if group.stages == ('u-p1',):
             return _late_on_ramps(fitter, group, best, drive)
+        best = ahead_on_ramps(fitter, group, best, problem)
+        problem = (fitter.unknowns(group), *problem[1:])
         return put_in_its_period(fitter, group, best, problem)
     swept = [with_any_stem(fitter, each, problem) for each in found[:SWEPT]]
     found += [fitter.fit(each, problem, SHORT) for each in swept]
@@ -124,16 +126,34 @@ def _late_on_ramps(fitter: Fitter, group: Group, valve: Valve, drive: Sequence[s
     Samples of them say where they were then, not where they stayed until the next one.
     """
     fitter.blend = True
-    problem = (fitter.unknowns(group), group.signal, tuple(drive))
-    starts = [{**valve.values, 'blend': share} for share in BLENDS]
-    late = min(
-        (fitter.fit(each, problem) for each in fitter.scan(valve, starts, problem, 2)), key=by_cost
+    late = _with_nuisance(
+        fitter, valve, BLEND, (fitter.unknowns(group), group.signal, tuple(drive))
     )
-    inflation = leftover(fitter.residuals(late, group.signal, drive)).inflation
-    if 0.5 * (valve.cost - late.cost) / inflation >= odds.TWIN_GAIN:
-        return late
-    fitter.blend = False
-    return valve
+    fitter.blend = late is not valve
+    return late
+
+
+def ahead_on_ramps(fitter: Fitter, group: Group, valve: Valve, problem: Problem) -> Valve:
+    """Return a valve to which commands that go on and on do so between two samples as well.
+
+    Held until the next sample they would be late by half a period; steps are not.
+    """
+    if fitter.lead or group.signal != 'p2' or fitter.phase is LATE or 'p1' in problem[2]:
+        return valve
+    fitter.lead = True
+    ahead = _with_nuisance(fitter, valve, LEAD, ((*problem[0], LEAD), *problem[1:]))
+    fitter.lead = ahead is not valve
+    return ahead
+
+
+def _with_nuisance(fitter: Fitter, valve: Valve, nuisance: Unknown, problem: Problem) -> Valve:
+    """Return a valve with one more unknown of the commands if that is clearly better."""
+    starts = [{**valve.values, nuisance.name: share} for share in SHARES]
+    found = [fitter.fit(each, problem) for each in fitter.scan(valve, starts, problem, 2)]
+    better = min(found, key=by_cost)
+    inflation = leftover(fitter.residuals(better, *problem[1:])).inflation
+    clearly = 0.5 * (valve.cost - better.cost) / inflation >= odds.TWIN_GAIN
+    return better if clearly else valve
 
 
 def _along_the_valley(fitter: Fitter, valve: Valve, problem: Problem) -> list[Valve]:
@@ -203,7 +223,7 @@ def _settle_phase(fitter: Fitter, group: Group, valve: Valve) -> None:
         starts = [{**values, **own, **there} for own in added for there in points]
         return fitter.fit(fitter.scan(kind, starts, problem)[0], problem, SHORT)
 
-    fitter.blend = False
+    fitter.blend = fitter.lead = False
     early, late = (fitted(valve, [{}], phase) for phase in (EARLY, LATE))
     lags_early, lags_late = (fitted(lagging, lag.starts({}), phase) for phase in (EARLY, LATE))
     # a lag of 0 is none: the search with one may have ended elsewhere

@@ -189,7 +189,10 @@ class Bench:
         if HELD in drive:
             theta[STUCK] = IMMENSE
         grid = self.stretches[index].grid(
-            values.get('phase', 0.0), tuple(drive), values.get('blend', 0.0)
+            values.get('phase', 0.0),
+            tuple(drive),
+            values.get('blend', 0.0),
+            values.get('lead', 0.0),
         )
         outputs = np.empty((BESIDE + 1, grid.u.size))
         slack = min(SLACK, SLACK_SHARE * values['f_s'])

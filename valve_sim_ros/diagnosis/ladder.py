@@ -11,7 +11,7 @@ from ..model.effects import CATALOGUE
 from . import odds
 from .adequacy import but_one_slip, Leftover, leftover
 from .arrivals import put_in_its_period
-from .base_valve import find_base, on_other_side, on_time
+from .base_valve import ahead_on_ramps, find_base, on_other_side, on_time
 from .fitting import by_cost, Fitter, Valve
 from .loosening import loosened
 from .race import race, rebased
@@ -200,7 +200,8 @@ def climb(
 
 def _on_time(fitter: Fitter, group: Group, rung: Rung) -> Rung:
     """Return a step with commands where its valve shows that they came."""
-    valve = put_in_its_period(fitter, group, rung.valve, fitter.problem(group, rung.valve))
+    valve = ahead_on_ramps(fitter, group, rung.valve, fitter.problem(group, rung.valve))
+    valve = put_in_its_period(fitter, group, valve, fitter.problem(group, valve))
     return _with(fitter, group, rung, valve)
 
 

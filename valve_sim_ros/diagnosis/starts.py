@@ -20,6 +20,7 @@ START: dict[str, float] = {
     'damping': 1.8,
     'phase': 0.0,
     'blend': 0.0,
+    'lead': 0.0,
 }
 GRID: dict[str, tuple[float, ...]] = {
     'f_d1': (0.1, 0.5, 1.5, 4.0),

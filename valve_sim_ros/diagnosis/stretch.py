@@ -87,14 +87,17 @@ class Stretch:
             found[name] = fallback
         return found
 
-    def grid(self, phase: float, drive: tuple[str, ...], blend: float = 0.0) -> Grid:
+    def grid(
+        self, phase: float, drive: tuple[str, ...], blend: float = 0.0, lead: float = 0.0
+    ) -> Grid:
         """Return the stretch with the commands moved by a share of a period.
 
         With `phase` > 0 a change of u that the recording shows at a sample came that share of a
         period earlier, with `phase` < 0 later. A command that goes on and on may be late by the
-        share `blend` of a period: what the valve then receives lies between two samples.
+        share `blend` of a period: what the valve then receives lies between two samples. Its
+        changes come by the share `lead` sooner than steps: it goes on between samples, too.
         """
-        key = round(phase, 4), drive, round(blend, 4)
+        key = round(phase, 4), drive, round(blend, 4), round(lead, 4)
         found = self._grids.get(key)  # other threads may clear them meanwhile
         if found is None:
             if len(self._grids) > KEPT_GRIDS:
@@ -131,11 +134,12 @@ class Stretch:
                 each['p1'] = each['p1'].copy()
                 each['p1'][rows[rows < self.time.size]] = np.nan
 
-    def _moved(self, phase: float, drive: tuple[str, ...], blend: float) -> Grid:
+    def _moved(self, phase: float, drive: tuple[str, ...], blend: float, lead: float) -> Grid:
         n = self.time.size
         sent = blended(self.u, blend) if blend else self.u
         changed = np.flatnonzero(np.diff(sent)) + 1
-        each = np.clip(phase + self.sooner[changed], EARLIEST, LATEST)
+        sooner = self.sooner + lead * goes_on(sent) if lead else self.sooner
+        each = np.clip(phase + sooner[changed], EARLIEST, LATEST)
         periods = np.diff(self.time, append=2 * self.time[-1] - self.time[-2])
         came = self.time[changed] - each * np.where(each > 0.0, *periods[[changed - 1, changed]])
         came = np.maximum.accumulate(came)
@@ -176,10 +180,14 @@ class Stretch:
 
 def blended(u: Array, share: float) -> Array:
     """Return commands that go on from sample to sample late by a share of a period."""
+    return np.where(goes_on(u), (1.0 - share) * u + share * np.concatenate([u[:1], u[:-1]]), u)
+
+
+def goes_on(u: Array) -> npt.NDArray[np.bool_]:
+    """Tell at which samples a command changes that changes at the sample before or after, too."""
     moves = np.diff(u, prepend=u[:1]) != 0.0
     beside = np.concatenate([[False], moves, [False]])
-    on = moves & (beside[:-2] | beside[2:])
-    return np.where(on, (1.0 - share) * u + share * np.concatenate([u[:1], u[:-1]]), u)
+    return moves & (beside[:-2] | beside[2:])
 
 
 def shifted(u: Array, steps: Rows, sooner: bool) -> Array:

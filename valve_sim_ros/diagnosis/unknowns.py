@@ -67,6 +67,8 @@ EARLY = Unknown('phase', 0.0, 0.999, 'linear', 0.1)
 LATE = Unknown('phase', -1.0, -0.001, 'linear', 0.1)
 BLEND = Unknown('blend', 0.0, 0.999, 'linear', 0.1)
 """Share of a period by which a command that goes on and on reaches p1 late."""
+LEAD = Unknown('lead', 0.0, 0.999, 'linear', 0.1)
+"""Share of a period by which its changes come sooner than steps: it goes on between samples."""
 
 
 def start_of(name: str) -> Unknown:
