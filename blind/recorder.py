@@ -40,6 +40,8 @@ class Recorder:
         Single wild values.
     loss : float
         Share of lost values, commands as well.
+    commands : int
+        How many are sent in a period while they go on; a step is one.
     as_sent : bool
         Whether the column u holds the commands as they were sent, one for each row, instead of
         the last one that had arrived when the row's signals were sampled.
@@ -56,6 +58,7 @@ class Recorder:
     resolution: dict[str, float] = field(default_factory=dict)
     outliers: int = 0
     loss: float = 0.0
+    commands: int = 1
     as_sent: bool = False
     bag: bool = False
 
@@ -69,6 +72,7 @@ def draw_recorder(rng: Rng, share: float) -> Recorder:
 
     signals = ('p1', 'p2', 'x')
     bag = rng.random() < 0.15
+    commands = 10 if rng.random() < share and not bag else 1
     return Recorder(
         period=float(rng.choice((0.2, 0.1, 0.5), p=(0.8, 0.1, 0.1))),
         phase=sometimes(0.02, 0.98),
@@ -81,7 +85,8 @@ def draw_recorder(rng: Rng, share: float) -> Recorder:
         else dict.fromkeys(signals, 0.0),
         outliers=int(rng.integers(1, 5)) if rng.random() < 0.5 * share else 0,
         loss=0.02 if rng.random() < share else 0.0,
-        as_sent=bool(rng.random() < 0.5),
+        commands=commands,
+        as_sent=bool(rng.random() < 0.5) and commands == 1,
         bag=bag,
     )
 

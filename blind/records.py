@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """One blind record: a random valve, its hidden effects, its commands, its recorder, its key."""
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -87,8 +87,17 @@ def draw_plan(rng: Rng, effects: tuple[str, ...], recorder: Recorder, step: floa
 
 def run(plan: Plan, physics: Physics, recorder: Recorder, times: np.ndarray) -> Trace:
     """Simulate the plan from the run-in to the last sample."""
-    command_times = recorder.period * np.arange(plan.u.size)
-    return simulate(plan.u, command_times, times, physics, step=plan.step, origin=RUN_IN)
+    return simulate(*sent(plan, recorder), times, physics, step=plan.step, origin=RUN_IN)
+
+
+def sent(plan: Plan, recorder: Recorder) -> tuple[np.ndarray, np.ndarray]:
+    """Return the commands as they are sent [%], and when [s]."""
+    u, count = plan.u, recorder.commands
+    changes = np.append(np.diff(u), 0.0)
+    moves = np.concatenate([[False], changes != 0.0, [False]])
+    goes_on = moves[1:-1] & (moves[:-2] | moves[2:])
+    ways = np.where(goes_on, changes, 0.0)[:, None] * np.arange(count) / count
+    return (u[:, None] + ways).ravel(), recorder.period / count * np.arange(u.size * count)
 
 
 def record_part(plan: Plan, recorder: Recorder) -> slice:
@@ -182,12 +191,12 @@ def draw(
 
 
 def command_beside(blind: Blind) -> np.ndarray:
-    """Return the index of the command that is written beside each sample."""
-    step, count = blind.plan.step, blind.times.size
+    """Return which of the commands sent is written beside each sample."""
     if blind.recorder.as_sent:
-        return np.arange(count)
-    command_steps = np.rint(blind.recorder.period * np.arange(count) / step)
-    return np.searchsorted(command_steps, np.rint(blind.times / step), side='right') - 1
+        return np.arange(blind.times.size)
+    _, times = sent(blind.plan, blind.recorder)
+    command_steps = np.rint(times / blind.plan.step)
+    return np.searchsorted(command_steps, np.rint(blind.times / blind.plan.step), 'right') - 1
 
 
 def write_continuation(blind: Blind, signals: tuple[str, ...], path: Path) -> None:
@@ -195,7 +204,7 @@ def write_continuation(blind: Blind, signals: tuple[str, ...], path: Path) -> No
     plan, period = blind.plan, blind.recorder.period
     part = record_part(plan, blind.recorder)
     times = period * np.arange(plan.u.size)
-    trace = run(plan, plan.valve(), blind.recorder, times)
+    trace = run(plan, plan.valve(), replace(blind.recorder, commands=1), times)
     after = {'u': plan.u[part.stop :]}
     after |= {signal: getattr(trace, signal)[part.stop :] for signal in signals}
     write_csv(path, times[part.stop :] - part.start * period, after)
@@ -208,7 +217,7 @@ def write(blind: Blind, rng: Rng, name: str, signals: tuple[str, ...], folder: P
     part = record_part(plan, recorder)
     found = measured(blind.trace, recorder, signals, rng)
     commands = plan.u[part].copy()
-    columns = {'u': plan.u[command_beside(blind)], **found}
+    columns = {'u': sent(plan, recorder)[0][command_beside(blind)], **found}
     lost = rng.random(blind.times.size) < recorder.loss
     lost[: part.start + 1] = False  # nothing is known to hold before the first
     commands[lost[part]] = columns['u'][lost] = np.nan

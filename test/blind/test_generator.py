@@ -159,3 +159,14 @@ def test_that_the_steps_of_a_coarse_sensor_show_against_its_noise():
     on_top = Recorder(noise={'x': 0.2}, resolution={'x': 0.0})
     assert not records.steps_show(plan, on_top)
     assert records.steps_show(plan, replace(on_top, resolution={'x': 0.5}))
+
+
+def test_that_ramps_go_on_between_samples_and_steps_do_not():
+    u = np.array([20.0, 20.0, 21.0, 22.0, 22.0, 60.0, 60.0])
+    plan = records.Plan(Physics(), {}, u, 1.4, 1e-3)
+    recorder = Recorder(period=PERIOD, commands=4)
+    commands, times = records.sent(plan, recorder)
+    assert times == pytest.approx(0.05 * np.arange(28))
+    assert commands[::4] == pytest.approx(u)
+    assert commands[4:12] == pytest.approx([20.0, 20.25, 20.5, 20.75, 21.0, 21.25, 21.5, 21.75])
+    assert (commands[[3, 12, 19, 20]] == [20.0, 22.0, 22.0, 60.0]).all()
