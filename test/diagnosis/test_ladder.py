@@ -25,7 +25,7 @@ from valve_sim_ros.diagnosis.ladder import (
     Ladder,
     reconsidered,
 )
-from valve_sim_ros.diagnosis.odds import explained, strong, suspicious
+from valve_sim_ros.diagnosis.odds import blurred, explained, imitates, strong, suspicious
 from valve_sim_ros.diagnosis.race import race
 from valve_sim_ros.diagnosis.rung import judged, Rung
 from valve_sim_ros.diagnosis.stages import groups
@@ -94,6 +94,37 @@ def test_what_is_named_in_p1_must_explain_more():
     assert explained('x', left(100.0), left(1.5), names)
     assert not explained('p1', left(100.0), left(1.5), names)
     assert explained('p1', left(1000.0), left(1.5), names)
+    # unless that comes of the noise of x, which the loop sees
+    assert explained('p1', left(100.0), left(1.5), names, blurred=1.0)
+
+
+def test_a_loop_makes_noise_of_x_that_of_p1():
+    valve = replace(starting_valve(Bench([measured()])), effects=('positioner_loop',))
+    noise = {'p1': 0.2, 'x': 0.3}
+
+    def excess(gain):
+        there = replace(valve, values={**valve.values, 'positioner_loop.gain': gain})
+        return blurred(there, noise)
+
+    assert excess(1.0) == pytest.approx((0.7 * 1.5) ** 2)
+    assert excess(3.0) == pytest.approx(9.0 * excess(1.0))
+    assert blurred(replace(valve, effects=()), noise) == 0.0
+
+
+@pytest.mark.parametrize(
+    ('effect', 'odd'),
+    [
+        ('linkage_backlash', {'f_d/f_s': 0.95}),
+        ('stribeck_friction', {'f_d/f_s': 0.95}),
+        ('sensor_lag', {'a_1/a_2': 2.1}),
+    ],
+)
+def test_a_base_valve_that_is_rare_passes_for_an_effect(effect, odd):
+    valve = starting_valve(Bench([measured()]))
+    assert not imitates(valve, effect)
+    there = replace(valve, values={**valve.values, **odd})
+    assert imitates(there, effect)
+    assert not imitates(there, 'dwell_friction')
 
 
 def test_jitter_may_leave_more_of_p2():

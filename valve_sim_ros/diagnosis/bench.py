@@ -102,8 +102,7 @@ class Bench:
             if 'x' in self.signals:
                 whole, noise = filled(stretch.measured['x']), self.noise['x']
                 rests, smoothed = still(whole, noise), smooth(whole, noise)
-                straight = straightened(whole, stretch.u, noise)
-                stretch.held = np.where(rests, smoothed, straight)
+                stretch.held = straightened(whole, stretch.u, noise)
                 stretch.rests = np.where(rests, smoothed, np.nan)
                 departed = self._travelled(stretch.held, 0.0) or samples.size
                 slope = slope_of(whole[:departed])

@@ -42,6 +42,8 @@ class Ladder:
     best_guess: Rung | None = None
     complete: bool = True
     """Whether all that could be missing was tried; not so if the diagnosis was stopped."""
+    blurred: float = 0.0
+    """Excess that comes of the noise of a measured x."""
 
     @property
     def told(self) -> str:
@@ -122,9 +124,12 @@ def climb(
         return [
             each
             for each in candidates
-            if (hidden and CATALOGUE[each.effect].imitated)
-            or (stepped and each.effect == odds.COARSE)
+            if (hidden and _imitated(each.effect, now)) or (stepped and each.effect == odds.COARSE)
         ]
+
+    def explained(rung: Rung) -> bool:
+        blurred = odds.blurred(rung.valve, fitter.bench.noise)
+        return odds.explained(group.signal, base_left, rung.after, [rung.effect], blurred)
 
     now, before = base, base_left = seen(valve)
     with suppress(*stops):
@@ -177,7 +182,7 @@ def climb(
                     guess = guess or rung
                     break
                 rungs, rung = both[:-1], both[-1]
-            elif not odds.explained(group.signal, base_left, rung.after, [rung.effect]):
+            elif not explained(rung):
                 guess = rung
                 if rung.closed < (odds.LEAST_AGAIN if again else odds.LEAST_FIRST):
                     break
@@ -195,7 +200,10 @@ def climb(
         progress(1.0)
         complete = True
     after = before if rungs else leftover(fitter.residuals(now, group.signal))
-    return Ladder(group, 'adequate', base, now, base_left, after, tuple(rungs), guess, complete)
+    blurred = odds.blurred(now, fitter.bench.noise)
+    return Ladder(
+        group, 'adequate', base, now, base_left, after, tuple(rungs), guess, complete, blurred
+    )
 
 
 def _on_time(fitter: Fitter, group: Group, rung: Rung) -> Rung:
@@ -211,6 +219,13 @@ def _with(fitter: Fitter, group: Group, rung: Rung, valve: Valve) -> Rung:
         return rung
     after = leftover(fitter.residuals(valve, group.signal))
     return replace(rung, valve=valve, after=after, closed=rung.before.closed_by(after))
+
+
+def _imitated(effect: str, base: Valve) -> bool:
+    """Tell whether to look for an effect where a base valve leaves nothing but noise."""
+    if _laborious(effect):
+        return odds.imitates(base, effect)
+    return CATALOGUE[effect].imitated != ''
 
 
 def _laborious(effect: str) -> bool:
@@ -287,7 +302,8 @@ def concluded(ladder: Ladder) -> Ladder:
     # next to nothing is left to close where the base valve imitates it
     hidden = all(odds.imitates(ladder.base, name) for name in names)
     spotless = hidden and ladder.after.excess <= odds.SPOTLESS
-    if names and (spotless or odds.explained(signal, ladder.before, ladder.after, names)):
+    explained = odds.explained(signal, ladder.before, ladder.after, names, ladder.blurred)
+    if names and (spotless or explained):
         return replace(ladder, outcome='missing_effect')
     # what does not explain the gap is not left in the valve either
     unknown = ladder.before.excess > odds.ADEQUATE[signal]

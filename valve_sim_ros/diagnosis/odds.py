@@ -9,15 +9,16 @@ from ..model.effects import CATALOGUE
 from .adequacy import Leftover
 from .fitting import Valve
 from .stages import Group
-from .unknowns import declared
+from .unknowns import declared, SLOWEST
 
 ENOUGH = 25.0
 """Least gain in half log-likelihoods of independent samples for any name."""
 MORE_ENOUGH, MORE_EXCESS, MORE_CLOSED = 60.0, 0.15, 0.6
 """What a further effect needs: gain (any effect, where the base valve leaves no least excess),
 excess before it, and the part of it that it closes."""
-NO_DROP = 0.97
-"""Kinetic over static friction beyond which a base valve is odd: its friction hardly falls."""
+NO_DROP, SLUGGISH = 0.93, 1.1
+"""Kinetic over static friction beyond which a base valve is odd, as its friction hardly falls; and
+how near to the slowest a stem is odd."""
 MORE_SHARE, FAR_OFF = 0.02, 2.0
 """Least part of the whole gap that it closes, unless it leaves nothing but noise; the excess that
 is far more than noise: it may close less of that, if both together explain the gap."""
@@ -32,6 +33,9 @@ SPOTLESS = 0.1
 """Excess that is nothing but noise."""
 NEGLIGIBLE = 1.0 / 3.0
 """An effect of less than this part of its least usual size is another run of the base valve."""
+LOOP, BLURRED = 'positioner_loop', 0.7
+"""The effect that sees the stem, as measured while p1 is looked at, and the share of its noise
+that is left then: hardly any where it rests, nearly all where it moves."""
 COARSE = 'sensor_quantisation'
 """The effect that the values of x show."""
 LASTING = (
@@ -180,10 +184,19 @@ def needed(
     return matters and (closed >= MORE_CLOSED or explained)
 
 
-def explained(signal: str, before: Leftover, after: Leftover, names: Collection[str]) -> bool:
-    """Tell whether the effects named explain the gap, so that none is unknown."""
+def explained(
+    signal: str,
+    before: Leftover,
+    after: Leftover,
+    names: Collection[str],
+    blurred: float = 0.0,
+) -> bool:
+    """Tell whether the effects named explain the gap, so that none is unknown.
+
+    `blurred` is the excess that comes of the noise of a measured x.
+    """
     # p1 knows neither slips nor a chamber's laws: there the right one leaves little but noise
-    if after.excess > (ADEQUATE['p1'] if signal == 'p1' else FAR_OFF):
+    if after.excess > (ADEQUATE['p1'] + blurred if signal == 'p1' else FAR_OFF):
         least = EXPLAINED_BUT_FAR
     elif before.excess > FAR_OFF and not {*names}.isdisjoint(LASTING):
         least = EXPLAINED_LASTING
@@ -194,9 +207,20 @@ def explained(signal: str, before: Leftover, after: Leftover, names: Collection[
     return before.closed_by(after) >= least
 
 
+def blurred(valve: Valve, noise: Mapping[str, float]) -> float:
+    """Return the excess of p1 behind a loop that sees a noisy x; `noise`: of each signal [%]."""
+    if LOOP not in valve.effects or not {'p1', 'x'} <= noise.keys():
+        return 0.0
+    return float(BLURRED * valve.values[f'{LOOP}.gain'] * noise['x'] / noise['p1']) ** 2
+
+
 def imitates(base: Valve, effect: str) -> bool:
-    """Tell whether a base valve without any drop of friction passes for one with an effect."""
-    return CATALOGUE[effect].imitated and base.values['f_d/f_s'] > NO_DROP
+    """Tell whether a base valve of a kind that is rare passes for one with an effect."""
+    odd = {
+        'friction': base.values['f_d/f_s'] > NO_DROP,
+        'stem': base.values['a_1/a_2'] < SLUGGISH * SLOWEST,
+    }
+    return odd.get(CATALOGUE[effect].imitated, False)
 
 
 def look_alike(one: str, other: str) -> bool:

@@ -158,11 +158,12 @@ def race(
         if deeply and runners:
             runners = _deepened(fitter, group, valve, runners, quick, progress)
         best = runners[0] if runners else valve
+        hidden = [each for each in slow if odds.imitates(valve, each.effect)]
         if excess(best) <= min(odds.CLEAN, NEARLY_ALL * excess(valve)):
             effect = best.candidates[-1].effect
-            slow = [each for each in slow if odds.look_alike(effect, each.effect)]
+            slow = [e for e in slow if e in hidden or odds.look_alike(effect, e.effect)]
         elif runners and excess(valve) < (odds.CLEAN if valve.candidates else FAINT):
-            slow = [each for each in slow if not CATALOGUE[each.effect].laborious]
+            slow = [e for e in slow if e in hidden or not CATALOGUE[e.effect].laborious]
         runners = heat(runners, slow)
         if deeply:
             runners = _deepened(fitter, group, valve, runners, slow, progress)

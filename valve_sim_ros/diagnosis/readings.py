@@ -27,9 +27,10 @@ REST, FEW = 5, 8
 """Samples over which two means agree while the stem rests, and too few for a slope."""
 NEAR, ALIKE = 15, 3.0
 """Samples on either side over which x is smoothed, those that differ by less than this [noise]."""
-WIDTHS, MISFIT, BENDS = (3, 5, 9, 15, 31), 1.7, 5.0
-"""Samples through which a line is laid, its largest mean square error [noise squared], and steps
-of the command beyond which x may bend [%]."""
+WIDTHS, MISFIT, RUN, BENT, BENDS = (3, 5, 9, 15, 31), 1.7, 3, 2.0, 5.0
+"""Samples through which a line is laid, its largest mean square error [noise squared], of how many
+samples in a row the mean error is looked at, how large it may be [its standard deviation], and
+steps of the command beyond which x may bend [%]."""
 LARGE, UNMOVED, ANSWERED = 16.0, 4.0, 0.5
 """A step of p1 that tells when it came; p1 has not moved yet; and part of it seen at once [noise,
 noise, share]."""
@@ -109,8 +110,11 @@ def _on_lines(x: Array, noise: float) -> Array:
         at = np.arange(width) - (width - 1) / 2.0
         near = sliding_window_view(x, width)
         mean, slope = near.mean(axis=1), near @ at / (at @ at)
-        off = np.abs(near - mean[:, None] - slope[:, None] * at) / noise
-        fits = (off.max(axis=1) < ALIKE) & (np.mean(off**2, axis=1) < MISFIT)
+        off = (near - mean[:, None] - slope[:, None] * at) / noise
+        fits = (np.abs(off).max(axis=1) < ALIKE) & (np.mean(off**2, axis=1) < MISFIT)
+        if width > RUN:
+            mean_off = sliding_window_view(off, RUN, axis=1).mean(axis=2)
+            fits &= np.abs(mean_off).max(axis=1) < BENT / np.sqrt(RUN)
         for place in (0, width // 2, width - 1):
             rows = place + np.flatnonzero(fits)
             own = 1.0 / width + at[place] ** 2 / (at @ at)

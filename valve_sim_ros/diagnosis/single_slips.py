@@ -68,7 +68,8 @@ def slip_by_slip(
         return left
 
     effect = CATALOGUE[valve.candidates[-1].effect] if valve.candidates else None
-    if effect and effect.imitated:  # where the base valve leaves nothing, single slips do not lead
+    if effect and effect.imitated and not effect.rugged:
+        # where the base valve leaves nothing, single slips do not lead
         scattered = nearby(each[0].values, unknowns, FINENESS)
         near = fitter.scan(each[0], scattered, problem, SCATTERS)
         found += [fitter.fit(there, problem, DESCENT) for there in near]

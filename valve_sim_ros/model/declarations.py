@@ -173,9 +173,10 @@ class Effect:
         A run with it takes many times as long: a search tries others first.
     rugged : bool
         A fit of it has many valleys: a search follows each of its starts further.
-    imitated : bool
-        A base valve with another friction or damping nearly does the same: a search looks for it
-        even where that leaves nothing but noise.
+    imitated : str
+        Nearly the same as what a base valve does whose 'friction' hardly drops, or whose 'stem' is
+        slow: a search looks for it even where that leaves nothing but noise; for a laborious one
+        only where it is such a valve.
     twins : mapping of str to str
         Effects that look alike, each with what tells them apart.
     variants : tuple of tuple of str
@@ -201,7 +202,7 @@ class Effect:
     order: int = 0
     laborious: bool = False
     rugged: bool = False
-    imitated: bool = False
+    imitated: Literal['', 'friction', 'stem'] = ''
     twins: Mapping[str, str] = field(default_factory=dict)
     variants: tuple[tuple[str, ...], ...] = ()
     balance: Callable[..., float] | None = None

@@ -43,7 +43,7 @@ EFFECT = Effect(
     memory=2,
     longest_step=0.1,
     order=10,
-    imitated=True,
+    imitated='stem',
     explanation='The position transmitter filters its signal, or the stem is damped so much '
     'that it lags by half a second or more.',
     symptom='Measured slips are rounded.',

@@ -170,6 +170,7 @@ EFFECT = Effect(
     confirm='Slow and fast ramps: the offset p2-x while moving depends on the speed.',
     laborious=True,
     rugged=True,
+    imitated='friction',
     twins={
         'presliding': 'presliding shows as motion below f_s: small reversals',
         'dwell_friction': 'that one depends on the time at rest: steps after short and long rests',
