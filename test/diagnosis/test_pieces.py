@@ -59,6 +59,16 @@ def test_an_effect_is_as_large_as_its_largest_parameter_is_for_one():
     assert odds.surprise(fitted(9.0, 1.0)) == 1
 
 
+def test_a_lag_of_next_to_nothing_is_another_run_of_the_base_valve():
+    (lag,) = [c for c in groups(('p1', 'p2', 'x'))[2].candidates() if c.effect == 'sensor_lag']
+
+    def fitted(time):
+        return Valve({'sensor_lag.time_constant': time}, candidates=(lag,))
+
+    assert odds.size(fitted(0.0)) < odds.size(fitted(0.01)) < odds.NEGLIGIBLE
+    assert odds.size(fitted(0.03)) > odds.NEGLIGIBLE
+
+
 def test_of_two_effects_that_fit_alike_the_one_in_its_usual_stage_is_named():
     each = {c.effect: c for c in groups(('p1', 'p2', 'x'))[2].candidates() if len(c.names) == 1}
     sizes = {'hysteresis.stem_width': 1.7, 'linkage_backlash.width': 1.9}

@@ -37,6 +37,7 @@ EFFECT = Effect(
             'linear',
             'Time constant of measured x',
             starts=(0.2, 0.7, 2.0),
+            usual=(0.05, 4.0),
         ),
     ),
     slots={'sensor_slot': sensor},
