@@ -156,12 +156,14 @@ def stribeck_friction(rng: Rng, valve: Physics, length: float) -> Changes:
 
 
 def presliding(rng: Rng, valve: Physics, length: float) -> Changes:
-    """Hold the stem by elastic bristles that give by this share of the band, or that break."""
+    """Hold the stem by bristles that give by this share of the band, slide late, or break."""
     if rng.random() < 0.3:
         return {'brittle': 1.0 / rng.uniform(0.1, 0.6)}
     changes = {'bristle': 1.0 / rng.uniform(0.1, 0.6), 'dahl': float(rng.random() < 0.4)}
     if not changes['dahl']:
         changes['bristle_stribeck'] = log_uniform(rng, 0.01, 0.1)
+    if rng.random() < 0.4:
+        changes['bristle_elastic'] = rng.uniform(0.4, 0.8)
     return changes
 
 

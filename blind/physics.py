@@ -67,6 +67,7 @@ class Physics(NamedTuple):
     bristle: float = 0.0
     bristle_damping: float = 0.0
     bristle_stribeck: float = 0.02
+    bristle_elastic: float = 0.0
     brittle: float = 0.0
     dahl: float = 0.0
     dwell_gain: float = 0.0

@@ -93,13 +93,23 @@ def coulomb(force, s, q, h, t):
 
 @numba.njit
 def bristles(force, s, q, h, t):
-    """Return the new speed of a stem held by elastic bristles (LuGre; Dahl without the drop)."""
+    """Return the new speed of a stem held by elastic bristles.
+
+    LuGre, Dahl without the drop, elastoplastic where they slide only once they are bent enough.
+    """
     v, z = s[at.V], s[at.BRISTLE]
     level = q.f_d
     if q.dahl == 0.0:
         level += (q.f_s - q.f_d) * exp(-((v / q.bristle_stribeck) ** 2))
     level *= friction_scale(1.0 if v > 0.0 else -1.0, s[at.X], q, t)
-    keep = 1.0 / (1.0 + h * q.bristle * abs(v) / level)
+    slides, bent = 1.0, q.bristle * abs(z)
+    if q.bristle_elastic > 0.0:
+        least = q.bristle_elastic * q.f_d
+        if z * v <= 0.0 or bent <= least:
+            slides = 0.0
+        elif bent < level:
+            slides = sin(0.5 * pi * (bent - least) / (level - least)) ** 2
+    keep = 1.0 / (1.0 + h * slides * q.bristle * abs(v) / level)
     elastic = q.bristle * keep * z + q.bristle_damping * (keep - 1.0) * z / h
     inertia = 1.0 + h * q.a_2 + h * q.a_1 * keep * (h * q.bristle + q.bristle_damping)
     new = (v + h * q.a_1 * (force - elastic)) / inertia

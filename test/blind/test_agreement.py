@@ -100,6 +100,11 @@ OTHER_FORMS = [
         {'stribeck': 8.0, 'stribeck_power': 1.0},
         {'velocity': 8.0, 'exponent': 1.0},
     ),
+    (
+        'presliding',
+        {'bristle': 2.0, 'bristle_stribeck': 1.0, 'bristle_elastic': 0.6},
+        {'compliance': 0.5, 'drop_speed': 1.0, 'elastic': 0.6},
+    ),
     ('presliding', {'brittle': 5.0}, {'compliance': 0.0, 'stuck_compliance': 0.2}),
     (
         'nonlinear_flow',

@@ -24,7 +24,7 @@ class Bristles(NamedTuple):
     """Constants of the stem on its bristles.
 
     k/m [1/s^2], F_v/m [1/s], stiffness and damping [s] of the bristles relative to the spring, v_s
-    [%/s], and friction.
+    [%/s], share of f_d up to which they do not slide, and friction.
     """
 
     inertia: float
@@ -32,6 +32,7 @@ class Bristles(NamedTuple):
     stiffness: float
     bristle_damping: float
     drop_speed: float
+    elastic: float
     friction: Friction
 
 
@@ -44,7 +45,7 @@ def motion(value: Any, state: Any, p: Any, memory: Any, dt: float) -> Motion:
     stiffness = min(1.0 / p[0], STIFFEST)
     inertia, damping = visible(theta.a_1, theta.a_2)
     omega = math.sqrt(inertia * stiffness)
-    b = Bristles(inertia, damping, stiffness, 2.0 * stiffness / omega, p[1], friction)
+    b = Bristles(inertia, damping, stiffness, 2.0 * stiffness / omega, p[1], p[3], friction)
     x, v, z = state.x, state.v, memory[0]
     if math.isnan(z):
         force = value.target + value.excess - friction.stiffness * x
@@ -111,6 +112,20 @@ def held(value: Any, state: Any, compliance: float, dt: float) -> Motion:
 
 
 @njit(forceinline=True)
+def sliding(z: float, v: float, level: float, dynamic: float, b: Bristles) -> float:
+    """Return the share of the bristles that slide: all, or none while they are bent but little."""
+    if b.elastic <= 0.0:
+        return 1.0
+    first, last = b.elastic * dynamic, level
+    force = b.stiffness * abs(z)
+    if z * v <= 0.0 or force <= first:
+        return 0.0
+    return (
+        0.5 - 0.5 * math.cos(math.pi * (force - first) / (last - first)) if force < last else 1.0
+    )
+
+
+@njit(forceinline=True)
 def rates(p2: float, x: float, v: float, z: float, b: Bristles) -> tuple[float, float]:
     """Return the rates of the stem's speed [%/s^2] and of the bristles [%/s]."""
     f = b.friction
@@ -120,7 +135,7 @@ def rates(p2: float, x: float, v: float, z: float, b: Bristles) -> tuple[float, 
     if abs(ratio) < FAST:
         fall = math.exp(-ratio * ratio) if abs(ratio) > SLOW else 1.0
         level += (static - dynamic) * fall
-    slope = v - b.stiffness * abs(v) * z / level
+    slope = v - b.stiffness * abs(v) * z / level * sliding(z, v, level, dynamic, b)
     force = p2 - f.stiffness * x - b.stiffness * z - b.bristle_damping * slope
     return b.inertia * force - b.damping * v, slope
 
@@ -167,6 +182,19 @@ EFFECT = Effect(
             usual=(0.03, 1.2),
             step=0.02,
         ),
+        EffectParameter(
+            'elastic',
+            'z_ba/z_d',
+            '-',
+            0.0,
+            0.0,
+            0.95,
+            'linear',
+            'Share of f_d up to which the bristles bend without sliding',
+            neutral=0.0,
+            starts=(0.6,),
+            step=0.03,
+        ),
     ),
     slots={'motion_slot': motion},
     memory=1,
@@ -174,11 +202,18 @@ EFFECT = Effect(
     explanation='The packing gives way elastically before the stem breaks away.',
     symptom='Micro-motion below f_s, minor loops, and no clean stick.',
     confirm='Small reversals below the breakaway force, with a fine position sensor.',
-    variants=(('compliance', 'drop_speed'), ('stuck_compliance',)),
+    variants=(
+        ('compliance', 'drop_speed'),
+        ('compliance', 'drop_speed', 'elastic'),
+        ('stuck_compliance',),
+    ),
     laborious=True,
     twins={
         'sensor_quantisation': 'small steps of a coarse sensor hide micro-motion: finer sensor',
         'hysteresis': 'hysteresis of the converter shows in p1 already: record p1',
     },
-    references=('Canudas de Wit, Olsson, Astrom, Lischinsky 1995 (LuGre); models.md sec. 4.3',),
+    references=(
+        'Canudas de Wit, Olsson, Astrom, Lischinsky 1995 (LuGre); models.md sec. 4.3',
+        'Dupont, Hayward, Armstrong, Altpeter 2002, Single state elastoplastic friction models',
+    ),
 )
