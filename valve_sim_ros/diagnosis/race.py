@@ -158,7 +158,8 @@ def race(
         if deeply and runners:
             runners = _deepened(fitter, group, valve, runners, quick, progress)
         best = runners[0] if runners else valve
-        hidden = [each for each in slow if odds.imitates(valve, each.effect)]
+        nothing_left = excess(valve) < FAINT
+        hidden = [e for e in slow if nothing_left and odds.imitates(valve, e.effect)]
         if excess(best) <= min(odds.CLEAN, NEARLY_ALL * excess(valve)):
             effect = best.candidates[-1].effect
             slow = [e for e in slow if e in hidden or odds.look_alike(effect, e.effect)]

@@ -10,7 +10,7 @@ from itertools import product
 from ..model.effects import CATALOGUE
 from . import odds
 from .adequacy import Leftover, leftover
-from .fitting import by_cost, eased, FINE, Fitter, GENERATIONS, Problem, SHORT, Valve
+from .fitting import by_cost, eased, FAINT, FINE, Fitter, GENERATIONS, Problem, SHORT, Valve
 from .starts import nearby, STEMS
 from .stretch import CAUGHT, PUT_TO_REST, RESTS
 
@@ -68,7 +68,7 @@ def slip_by_slip(
         return left
 
     effect = CATALOGUE[valve.candidates[-1].effect] if valve.candidates else None
-    if effect and effect.imitated and not effect.rugged:
+    if effect and effect.imitated and (not effect.rugged or plain(drive).excess < FAINT):
         # where the base valve leaves nothing, single slips do not lead
         scattered = nearby(each[0].values, unknowns, FINENESS)
         near = fitter.scan(each[0], scattered, problem, SCATTERS)
