@@ -314,3 +314,26 @@ def test_a_clean_record_in_steps_of_a_tenth_is_adequate(noise):
     found = diagnose([Recording(s.t, u, *coarse)])
     assert found.verdict == 'adequate'
     assert all(ladder.before.excess < 0.2 for ladder in found.ladders)
+
+
+@pytest.mark.parametrize(('drop', 'sought'), [(0.95, True), (0.6, False)])
+def test_where_nothing_is_left_stribeck_friction_is_sought_beside_a_rare_base_valve(
+    drop, sought, monkeypatch
+):
+    fitter, base = fitted(measured())
+    tried = []
+
+    def screened(fitter, candidate, *rest):
+        tried.append(candidate.effect)
+        return replace(base, cost=1.0, candidates=(candidate,))
+
+    monkeypatch.setattr(racing, '_screened', screened)
+    monkeypatch.setattr(Fitter, 'evolve', lambda self, valve, *rest: valve)
+    monkeypatch.setattr(Fitter, 'fit', lambda self, valve, *rest: valve)
+    rare = replace(base, values={**base.values, 'f_d/f_s': drop})
+    noise = np.tile([0.9, -0.9], 2500)
+    monkeypatch.setattr(Fitter, 'residuals', lambda self, valve, *rest: noise)
+    names = {'sensor_lag', 'stribeck_friction'}
+    race(fitter, STEM, rare, [each for each in STEM.candidates() if each.effect in names])
+    assert ('stribeck_friction' in tried) == sought
+    assert 'sensor_lag' in tried
