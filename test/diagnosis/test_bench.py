@@ -25,7 +25,6 @@ from valve_sim_ros.diagnosis.stretch import CAUGHT, HELD, ON_TIME, RESTS
 from valve_sim_ros.diagnosis.unknowns import complete
 from valve_sim_ros.diagnosis.workers import cheapest
 from valve_sim_ros.model.effects import CATALOGUE
-from valve_sim_ros.model.scoring import forgive
 from valve_sim_ros.recordings.recording import Recording
 
 
@@ -65,17 +64,6 @@ def test_where_pressure_creeps_the_moment_of_a_slip_is_forgiven():
     assert np.nanmax(np.abs(own)) < 6.0
     assert np.nanmax(np.abs(little)) < 6.0
     assert np.nanmax(np.abs(much)) > 10.0
-
-
-@pytest.mark.parametrize(('slip', 'forgiven'), [(0.4, False), (1.6, True)])
-def test_slips_smaller_than_noise_forgive_no_noise(slip, forgiven):
-    """A stem that slips on and on by less than noise would take half of that away."""
-    noise = 0.2
-    outputs = np.tile(50.0 + slip * (np.arange(200) >= 100), (4, 1))
-    target = outputs[2] + noise * np.random.default_rng(1).standard_normal(200)
-    relief = forgive(outputs, 0, 200, target, np.full(200, 1.0 / noise))
-    assert (relief > 0.0) == forgiven
-    assert (outputs[3] != outputs[2]).any() == forgiven
 
 
 def test_what_no_slip_explains_is_not_forgiven():

@@ -15,8 +15,6 @@ HUBER = 4.0
 """Error beyond which a score grows linearly [noise]."""
 DOUBTFUL = 1.0
 """Largest error that counts where the moment of a slip is in doubt [noise]."""
-SEEN = 3.0
-"""A smaller slip does not tell its moment: what it left of errors would be noise [noise]."""
 STEM, BESIDE = 2, 3
 """Rows of x, and of the x to hold beside the measured one, among the outputs."""
 
@@ -50,8 +48,6 @@ def forgive(outputs: Array, first: int, last: int, target: Array, scale: Array) 
     x = outputs[STEM, first:last]
     low, high = x.min(), x.max()
     relief = 0.0
-    if (high - low) * scale[first] < SEEN:
-        return relief
     for k in range(first, last):
         error = (outputs[STEM, k] - target[k]) * scale[k]
         if abs(error) > DOUBTFUL:
