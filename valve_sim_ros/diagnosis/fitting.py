@@ -8,6 +8,7 @@ import math
 
 import numpy as np
 
+from ..model.effects import CATALOGUE
 from ..model.pipeline import Array
 from .adequacy import leftover
 from .bench import Bench
@@ -25,7 +26,8 @@ SHORT, LONG = 4, 20
 SPREAD, NARROW, FINE = 5.0, 3.0, 1.0
 """Standard deviation with which an evolution begins, near an optimum, and where a train of slips
 hangs on every step [steps of unknowns]."""
-POPULATION = 14
+POPULATION, CROWD = 14, 42
+"""Members of an evolution, and of one where costs are rugged and fewer left slips wrong."""
 FAINT = 0.02
 """Excess up to which a train of slips is right; laborious effects leave more in a base valve."""
 GENERATIONS, PATIENT, MOST_TURNS = 40, 150, 3
@@ -134,6 +136,7 @@ class Fitter:
         problem: Problem,
         generations: int,
         spread: float = SPREAD,
+        population: int = POPULATION,
     ) -> Valve:
         """Return the best valve that evolution finds around this one."""
         unknowns, signal, drive = problem
@@ -148,7 +151,7 @@ class Fitter:
             spread,
             np.random.default_rng(self.seed),
             generations,
-            POPULATION,
+            population,
         )
         return replace(
             valve, values=to_values(unknowns, found.point, valve.values), cost=found.cost
@@ -160,21 +163,27 @@ class Fitter:
         if 'f_s' not in (unknown.name for unknown in problem[0]):
             return valve
         _, signal, drive = problem
+        rugged = any(CATALOGUE[each.effect].rugged for each in valve.candidates)
         there = valve
-        strayed = leftover(self.residuals(valve, signal, drive)).excess > FAINT
-        for way in eased(problem) if strayed else ():
+        for way in () if self._right(valve, signal, drive) else eased(problem):
             spread = FINE if way == problem else NARROW
             there = self.fit(self.evolve(there, way, GENERATIONS, spread), way)
         valve = min(valve, there, key=by_cost)
-        for spread in (NARROW, FINE):
+        for spread, population in ((NARROW, POPULATION), (FINE, POPULATION), (FINE, CROWD)):
+            if population == CROWD and (not rugged or self._right(valve, signal, drive)):
+                break
             for _ in range(MOST_TURNS):
-                more = self.evolve(valve, problem, GENERATIONS, spread)
+                more = self.evolve(valve, problem, GENERATIONS, spread, population)
                 more = self.fit(more, problem)
                 ends = more.cost > 0.99 * valve.cost
                 valve = min(valve, more, key=by_cost)
                 if ends:
                     break
         return valve
+
+    def _right(self, valve: Valve, signal: str, drive: tuple[str, ...]) -> bool:
+        """Tell whether a train of slips is right."""
+        return leftover(self.residuals(valve, signal, drive)).excess <= FAINT
 
     def problem(self, group: Group, valve: Valve) -> Problem:
         """Return what a refit of a valve varies in a group, driven as is usual here."""

@@ -270,6 +270,8 @@ def reconsidered(
     if only := enough(second, earlier):
         return only
     later = alone(second.valve, added, first.valve.candidates[-1])
+    if not _laborious(second.effect):  # the first may have led it into another valley
+        later = min(later, *race(fitter, group, base, [added])[:1], key=by_cost)
     if only := enough(second, later):
         return only
     runners = race(fitter, group, later, candidates)

@@ -16,7 +16,7 @@ ENOUGH = 25.0
 MORE_ENOUGH, MORE_EXCESS, MORE_CLOSED = 60.0, 0.15, 0.6
 """What a further effect needs: gain (any effect, where the base valve leaves no least excess),
 excess before it, and the part of it that it closes."""
-NO_DROP, SLUGGISH = 0.97, 1.1
+NO_DROP, SLUGGISH = 0.93, 1.1
 """Kinetic over static friction beyond which a base valve is odd, as its friction hardly falls; and
 how near to the slowest a stem is odd."""
 MORE_SHARE, FAR_OFF = 0.02, 2.0

@@ -15,6 +15,9 @@ HUBER = 4.0
 """Error beyond which a score grows linearly [noise]."""
 DOUBTFUL = 1.0
 """Largest error that counts where the moment of a slip is in doubt [noise]."""
+FORGIVEN = 0.484
+"""What forgiving takes on average from the score of a sample with nothing but noise:
+1 - E[min(e^2, DOUBTFUL^2)] of a normal e. Charged back, doubt is neither a gain nor a loss."""
 STEM, BESIDE = 2, 3
 """Rows of x, and of the x to hold beside the measured one, among the outputs."""
 
@@ -43,13 +46,15 @@ def forgive(outputs: Array, first: int, last: int, target: Array, scale: Array) 
     Returns
     -------
     float
-        By how much that lowers the score.
+        By how much that lowers the score, less what noise alone would let it do.
     """
     x = outputs[STEM, first:last]
     low, high = x.min(), x.max()
     relief = 0.0
     for k in range(first, last):
         error = (outputs[STEM, k] - target[k]) * scale[k]
+        if error == error:
+            relief -= FORGIVEN
         if abs(error) > DOUBTFUL:
             beside = min(max(target[k], low), high)
             if abs(beside - target[k]) * scale[k] < DOUBTFUL:
