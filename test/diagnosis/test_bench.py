@@ -25,6 +25,7 @@ from valve_sim_ros.diagnosis.stretch import CAUGHT, HELD, ON_TIME, RESTS
 from valve_sim_ros.diagnosis.unknowns import complete
 from valve_sim_ros.diagnosis.workers import cheapest
 from valve_sim_ros.model.effects import CATALOGUE
+from valve_sim_ros.model.scoring import forgive
 from valve_sim_ros.recordings.recording import Recording
 
 
@@ -64,6 +65,17 @@ def test_where_pressure_creeps_the_moment_of_a_slip_is_forgiven():
     assert np.nanmax(np.abs(own)) < 6.0
     assert np.nanmax(np.abs(little)) < 6.0
     assert np.nanmax(np.abs(much)) > 10.0
+
+
+@pytest.mark.parametrize(('slip', 'part'), [(10.0, 0.0), (0.5, -0.2)])
+def test_no_slip_takes_noise_away(slip, part):
+    outputs = np.zeros((4, 100_000))
+    target = np.random.default_rng(6).standard_normal(outputs.shape[1])
+    outputs[2, 0], outputs[2, -1] = -slip, slip  # x may be anywhere between
+    target[[0, -1]] = np.nan
+    relief = forgive(outputs, 0, target.size, target, np.ones_like(target))
+    assert relief < (part + 0.01) * target.size
+    assert relief == pytest.approx(cost_of(target[1:-1]) - cost_of((target - outputs[3])[1:-1]))
 
 
 def test_what_no_slip_explains_is_not_forgiven():

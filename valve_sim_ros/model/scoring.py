@@ -15,9 +15,9 @@ HUBER = 4.0
 """Error beyond which a score grows linearly [noise]."""
 DOUBTFUL = 1.0
 """Largest error that counts where the moment of a slip is in doubt [noise]."""
-FORGIVEN = 0.484
-"""What forgiving takes on average from the score of a sample with nothing but noise:
-1 - E[min(e^2, DOUBTFUL^2)] of a normal e. Charged back, doubt is neither a gain nor a loss."""
+NEUTRAL = 1.392
+"""Factor of what is left where errors beyond DOUBTFUL are cut, so that noise alone costs the same:
+1 / sqrt(E[min(e^2, DOUBTFUL^2)]) of a normal e."""
 STEM, BESIDE = 2, 3
 """Rows of x, and of the x to hold beside the measured one, among the outputs."""
 
@@ -35,33 +35,36 @@ def penalty(value: float, target: float, scale: float) -> float:
 def forgive(outputs: Array, first: int, last: int, target: Array, scale: Array) -> float:
     """Let errors of x be no larger than if the stem slipped at any moment of some samples.
 
+    Noise alone costs what it does elsewhere: a stem must not slip noise away.
+
     Parameters
     ----------
     outputs, target, scale
         As for `run_scored`; `outputs` receives the position nearest to the target among those the
-        stem passes, but none that is closer than DOUBTFUL unless x itself is.
+        stem passes, but none that is closer than DOUBTFUL unless x itself is, all as much further
+        away as NEUTRAL tells.
     first, last : int
         The samples, `last` not among them.
 
     Returns
     -------
     float
-        By how much that lowers the score, less what noise alone would let it do.
+        By how much that lowers the score.
     """
     x = outputs[STEM, first:last]
     low, high = x.min(), x.max()
     relief = 0.0
     for k in range(first, last):
         error = (outputs[STEM, k] - target[k]) * scale[k]
-        if error == error:
-            relief -= FORGIVEN
-        if abs(error) > DOUBTFUL:
+        size = abs(error)
+        if size > DOUBTFUL:
             beside = min(max(target[k], low), high)
-            if abs(beside - target[k]) * scale[k] < DOUBTFUL:
-                beside = target[k] + math.copysign(DOUBTFUL, error) / scale[k]
-            outputs[BESIDE, k] = beside
+            size = max(abs(beside - target[k]) * scale[k], DOUBTFUL)
+        size += (NEUTRAL - 1.0) * min(size, DOUBTFUL)
+        if error == error:
+            outputs[BESIDE, k] = target[k] + math.copysign(size, error) / scale[k]
             relief += penalty(outputs[STEM, k], target[k], scale[k])
-            relief -= penalty(beside, target[k], scale[k])
+            relief -= penalty(outputs[BESIDE, k], target[k], scale[k])
     return relief
 
 
