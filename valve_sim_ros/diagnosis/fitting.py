@@ -8,7 +8,6 @@ import math
 
 import numpy as np
 
-from ..model.effects import CATALOGUE
 from ..model.pipeline import Array
 from .adequacy import leftover
 from .bench import Bench
@@ -26,8 +25,7 @@ SHORT, LONG = 4, 20
 SPREAD, NARROW, FINE = 5.0, 3.0, 1.0
 """Standard deviation with which an evolution begins, near an optimum, and where a train of slips
 hangs on every step [steps of unknowns]."""
-POPULATION, CROWD = 14, 42
-"""Members of an evolution, and of one where costs are rugged and fewer left slips wrong."""
+POPULATION = 14
 FAINT = 0.02
 """Excess up to which a train of slips is right; laborious effects leave more in a base valve."""
 GENERATIONS, PATIENT, MOST_TURNS = 40, 150, 3
@@ -136,7 +134,6 @@ class Fitter:
         problem: Problem,
         generations: int,
         spread: float = SPREAD,
-        population: int = POPULATION,
     ) -> Valve:
         """Return the best valve that evolution finds around this one."""
         unknowns, signal, drive = problem
@@ -151,7 +148,7 @@ class Fitter:
             spread,
             np.random.default_rng(self.seed),
             generations,
-            population,
+            POPULATION,
         )
         return replace(
             valve, values=to_values(unknowns, found.point, valve.values), cost=found.cost
@@ -163,27 +160,21 @@ class Fitter:
         if 'f_s' not in (unknown.name for unknown in problem[0]):
             return valve
         _, signal, drive = problem
-        rugged = any(CATALOGUE[each.effect].rugged for each in valve.candidates)
         there = valve
-        for way in () if self._right(valve, signal, drive) else eased(problem):
+        strayed = leftover(self.residuals(valve, signal, drive)).excess > FAINT
+        for way in eased(problem) if strayed else ():
             spread = FINE if way == problem else NARROW
             there = self.fit(self.evolve(there, way, GENERATIONS, spread), way)
         valve = min(valve, there, key=by_cost)
-        for spread, population in ((NARROW, POPULATION), (FINE, POPULATION), (FINE, CROWD)):
-            if population == CROWD and (not rugged or self._right(valve, signal, drive)):
-                break
+        for spread in (NARROW, FINE):
             for _ in range(MOST_TURNS):
-                more = self.evolve(valve, problem, GENERATIONS, spread, population)
+                more = self.evolve(valve, problem, GENERATIONS, spread)
                 more = self.fit(more, problem)
                 ends = more.cost > 0.99 * valve.cost
                 valve = min(valve, more, key=by_cost)
                 if ends:
                     break
         return valve
-
-    def _right(self, valve: Valve, signal: str, drive: tuple[str, ...]) -> bool:
-        """Tell whether a train of slips is right."""
-        return leftover(self.residuals(valve, signal, drive)).excess <= FAINT
 
     def problem(self, group: Group, valve: Valve) -> Problem:
         """Return what a refit of a valve varies in a group, driven as is usual here."""
