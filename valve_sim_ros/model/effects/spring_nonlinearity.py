@@ -39,7 +39,7 @@ EFFECT = Effect(
             3.0,
             'linear',
             'Relative extra spring force when fully open, growing with the cube of x',
-            starts=(-0.2, 0.1, 0.4, 1.0),
+            starts=(-0.2, -0.05, 0.03, 0.1, 0.4, 1.0),
             usual=(0.03, 1.2),
         ),
         EffectParameter(
@@ -51,7 +51,7 @@ EFFECT = Effect(
             25.0,
             'linear',
             'Extra spring force at mid stroke',
-            starts=(-10.0, -3.0, 3.0, 10.0),
+            starts=(-10.0, -3.0, -1.0, 1.0, 3.0, 10.0),
             usual=(1.0, 20.0),
         ),
     ),
