@@ -158,12 +158,12 @@ def race(
         if deeply and runners:
             runners = _deepened(fitter, group, valve, runners, quick, progress)
         best = runners[0] if runners else valve
-        nothing_left = excess(valve) < FAINT
-        hidden = [e for e in slow if nothing_left and odds.imitates(valve, e.effect)]
-        if excess(best) <= min(odds.CLEAN, NEARLY_ALL * excess(valve)):
+        left = excess(valve)
+        hidden = [e for e in slow if left < FAINT and odds.imitates(valve, e.effect)]
+        if excess(best) <= min(odds.CLEAN, NEARLY_ALL * left):
             effect = best.candidates[-1].effect
             slow = [e for e in slow if e in hidden or odds.look_alike(effect, e.effect)]
-        elif runners and excess(valve) < (odds.CLEAN if valve.candidates else FAINT):
+        elif runners and left < (odds.CLEAN if valve.candidates else FAINT):
             slow = [e for e in slow if e in hidden or not CATALOGUE[e.effect].laborious]
         runners = heat(runners, slow)
         if deeply:
