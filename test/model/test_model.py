@@ -19,12 +19,13 @@ from valve_sim_ros.model.stem import Friction, Stem, stem_step
 from valve_sim_ros.model.tables import parameter_table, sample_file
 
 LEVEL = st.floats(0.0, 100.0)
+AT_REST = Stem(0.0, 0.0, 0.0, False)
 
 
-def stem_after(duration, target, excess, rate, a_1, a_2, f_s, f_d, delta=1e-5):
+def stem_after(duration, target, excess, rate, a_1, a_2, f_s, f_d, delta=1e-5, stem=AT_REST):
     poles = stem_poles(a_1, a_2)
     return stem_step(
-        Stem(0.0, 0.0, 0.0, False),
+        stem,
         target,
         excess,
         duration,
@@ -202,6 +203,26 @@ def test_exact_step_agrees_with_small_steps():
     u = random_record(200)
     s = simulate(u, parameters={'T_g2': 20.0})
     assert np.abs(substepped(s.p1, s.spec.theta, 320) - s.x).max() < 0.05
+
+
+def test_a_step_in_one_and_in_many_parts_agree():
+    """Swings, creeps and reversals: no stop is passed over, however short the halt."""
+    chance, parts = np.random.default_rng(1), 32
+    for _ in range(3000):
+        ratio, damping = np.exp(chance.uniform(np.log([2.0, 0.1]), np.log([80.0, 5.0])))
+        a_1 = (2.0 * damping * ratio) ** 2
+        rate, duration = np.exp(chance.uniform(-4.0, 4.0)), chance.choice([0.05, 0.2, 1.0])
+        f_s, target, excess = chance.uniform([0.1, -20.0, -20.0], [6.0, 20.0, 20.0])
+        valve = rate, a_1, a_1 / ratio, f_s, f_s * chance.uniform()
+        speed = chance.normal() * 10.0 ** chance.uniform(-2.0, 1.5)
+        moving = Stem(0.0, speed, np.sign(speed), True)
+        begun = moving if chance.uniform() < 0.7 else AT_REST
+        after, left = begun, excess
+        for _ in range(parts):
+            after = stem_after(duration / parts, target, left, *valve, stem=after)
+            left *= math.exp(-rate * duration / parts)
+        at_once = stem_after(duration, target, excess, *valve, stem=begun)
+        assert at_once.x == pytest.approx(after.x, abs=1e-6), (damping, duration, begun, valve)
 
 
 @pytest.mark.parametrize(

@@ -23,7 +23,17 @@ from .borrowing import borrowed
 from .electro_pneumatic import backlash
 from .pneumatic import chamber_pressure, is_filling
 from .slip import free_motion, stem_poles
-from .state import BASE_STEP, Lag, lag_over, Motion, State, Theta, Transition, transition_over
+from .state import (
+    BASE_STEP,
+    Lag,
+    lag_over,
+    Motion,
+    State,
+    Theta,
+    Transition,
+    transition_after,
+    transition_over,
+)
 from .stem import Friction, Stem, stem_step
 
 Array = npt.NDArray[np.float64]
@@ -87,7 +97,7 @@ def pushed(
         dt,
     )
     poles, phi1, phi2 = transition.poles, transition.phi1, transition.phi2
-    if rate != lag.rate or friction.stiffness != 1.0:
+    if rate < lag.rate or rate > lag.rate or friction.stiffness != 1.0:
         lag = lag_over(rate, dt, theta.a_1, theta.a_2, friction.stiffness)
     if friction.stiffness != 1.0:
         poles = stem_poles(theta.a_1 * friction.stiffness, theta.a_2)
@@ -153,12 +163,12 @@ def advance(
         motion = pushed(inlet, lag, now, theta, step, effects, memory)
         moves = motion.stem.direction != 0.0 or motion.stem.x != state.x or state.v != 0.0
         if moves and step.step == dt:
-            longest = stride_slot(dt, state, effects, memory, dt)
+            longest = stride_slot(BASE_STEP, state, effects, memory, dt)
             if abs(motion.stem.v - state.v) < STEADY * abs(state.v):
                 longest *= GLIDE
             if longest < dt:  # again, in short steps
                 left = math.ceil(dt / longest)
-                step = transition_over(dt / left, theta, BASE_STEP)
+                step = transition_after(transition, dt / left, BASE_STEP)
                 lag = step.filling if filling else step.emptying
                 continue
         stem, p2 = motion_slot(motion, now, effects, memory, step.step)[:2]
@@ -256,7 +266,7 @@ def run(
         if uniform and k == 0:
             duration = 0.0
         if duration != transition.dt:
-            transition = transition_over(duration, parameters, finest)
+            transition = transition_after(transition, duration, finest)
         now, x = advance_sample(u[k], now, parameters, transition, effects, memory)
         outputs[0, k] = now.p1
         outputs[1, k] = now.p2

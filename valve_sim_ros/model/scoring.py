@@ -9,7 +9,7 @@ from numba import njit
 
 from .borrowing import borrowed
 from .pipeline import advance_sample, Array, state_from, theta_from
-from .state import State, transition_over
+from .state import State, transition_after, transition_over
 
 HUBER = 4.0
 """Error beyond which a score grows linearly [noise]."""
@@ -129,7 +129,7 @@ def run_scored(
         if dt[k] != transition.dt:  # steps often alternate between two lengths
             transition, other = other, transition
             if dt[k] != transition.dt:
-                transition = transition_over(dt[k], parameters, finest)
+                transition = transition_after(transition, dt[k], finest)
         moved, before = moving, now.x
         now, x = advance_sample(u[k], now, parameters, transition, effects, memory)
         moving = now.x != before or (moved and dt[k] == 0.0)

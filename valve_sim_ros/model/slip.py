@@ -11,6 +11,8 @@ from typing import NamedTuple
 from numba import njit
 
 OVERDAMPED, CRITICAL, UNDERDAMPED = 0, 1, 2
+EIGHTH = 0.25 * math.pi
+"""An eighth of a period of a swing: nothing happens within less [rad]."""
 
 
 class Poles(NamedTuple):
@@ -86,11 +88,9 @@ def slip_speed(slip: Slip, decay: float, phi1: float, phi2: float) -> float:
     return slip.d1 * phi1 + slip.d2 * phi2 - slip.rate * slip.forced * decay
 
 
-@njit
-def speed_and_acceleration(tau: float, slip: Slip, poles: Poles) -> tuple[float, float]:
-    """Return the stem's speed [%/s] and acceleration [%/s^2] at `tau` seconds into the slip."""
-    phi1, phi2 = free_motion(tau, poles)
-    push = slip.rate * slip.forced * math.exp(-slip.rate * tau)
+@njit(forceinline=True)
+def slip_acceleration(slip: Slip, decay: float, phi1: float, phi2: float, poles: Poles) -> float:
+    """Return the stem's acceleration where `slip_position` returns its position [%/s^2]."""
     one, two = slip.d1 * phi1, slip.d2 * phi2
     if poles.regime == OVERDAMPED:
         bend = poles.first * one + poles.second * two
@@ -98,11 +98,34 @@ def speed_and_acceleration(tau: float, slip: Slip, poles: Poles) -> tuple[float,
         bend = poles.first * (one + two) + slip.d2 * phi1
     else:
         bend = poles.first * (one + two) + poles.second * (slip.d2 * phi1 - slip.d1 * phi2)
-    return one + two - push, bend + slip.rate * push
+    return bend + slip.rate * slip.rate * slip.forced * decay
+
+
+@njit
+def speed_and_acceleration(tau: float, slip: Slip, poles: Poles) -> tuple[float, float]:
+    """Return the stem's speed [%/s] and acceleration [%/s^2] at `tau` seconds into the slip."""
+    phi1, phi2 = free_motion(tau, poles)
+    decay = math.exp(-slip.rate * tau)
+    return (
+        slip_speed(slip, decay, phi1, phi2),
+        slip_acceleration(slip, decay, phi1, phi2, poles),
+    )
 
 
 @njit(forceinline=True)
-def surely_moving(
+def lowest(
+    duration: float, first: float, slope_first: float, last: float, slope_last: float
+) -> tuple[float, float]:
+    """Return when a speed that falls at first and rises at last is lowest at least, and how low.
+
+    A bent up curve stays above its tangents: there they meet.
+    """
+    when = (last - first - slope_last * duration) / (slope_first - slope_last)
+    return when, first + slope_first * when
+
+
+@njit(forceinline=True)
+def stops_once(
     slip: Slip,
     direction: float,
     delta: float,
@@ -111,14 +134,49 @@ def surely_moving(
     phi2: float,
     poles: Poles,
 ) -> bool:
-    """Tell whether a lower bound of the speed over the whole interval stays above delta."""
-    push = -direction * slip.rate * slip.forced
-    bound = min(push, push * decay) - delta
+    """Tell whether an overdamped slip, faster than delta now, surely falls below it only once.
+
+    A sum of exponentials has no more zeros than its partial sums, from the slowest one on, change
+    their sign (Laguerre). `decay`, `phi1` and `phi2` are those of now.
+    """
+    one, two = direction * slip.d1 * phi1, direction * slip.d2 * phi2
+    push = -direction * slip.rate * slip.forced * decay
+    slowest = push if slip.rate < -poles.first else one
+    quickest = push if slip.rate > -poles.second else two
+    return slowest <= delta or one + two + push - quickest >= delta
+
+
+@njit(forceinline=True)
+def surely_moving(
+    slip: Slip,
+    direction: float,
+    delta: float,
+    duration: float,
+    decay: float,
+    phi1: float,
+    phi2: float,
+    poles: Poles,
+) -> bool:
+    """Tell whether the speed of an armed slip surely stays above delta over an interval.
+
+    `decay`, `phi1` and `phi2` are those at its end.
+    """
+    if direction * slip_speed(slip, decay, phi1, phi2) <= delta:
+        return False
     if poles.regime == OVERDAMPED:
-        first, second = direction * slip.d1, direction * slip.d2
-        return bound + min(first, first * phi1) + min(second, second * phi2) > 0.0
+        return stops_once(slip, direction, delta, 1.0, 1.0, 1.0, poles)
+    quickest = max(1.0 / (EIGHTH * poles.scale), -poles.first, slip.rate)
+    if poles.regime == UNDERDAMPED and quickest * duration <= 1.0:
+        first = direction * slip_speed(slip, 1.0, 1.0, 0.0)
+        slope_first = direction * slip_acceleration(slip, 1.0, 1.0, 0.0, poles)
+        last = direction * slip_speed(slip, decay, phi1, phi2)
+        slope_last = direction * slip_acceleration(slip, decay, phi1, phi2, poles)
+        if not slope_first < 0.0 < slope_last:
+            return True
+        return lowest(duration, first, slope_first, last, slope_last)[1] > delta
+    push = -direction * slip.rate * slip.forced
     reach = 1.0 if poles.regime == UNDERDAMPED else -1.0 / (math.e * poles.first)
-    return bound - abs(slip.d1) - reach * abs(slip.d2) > 0.0
+    return min(push, push * decay) - delta - abs(slip.d1) - reach * abs(slip.d2) > 0.0
 
 
 @njit
@@ -129,24 +187,62 @@ def first_stop(
 
     The speed is a sum of at most four exponentials, each of which acts about its own time
     constant, or a decaying oscillation: a scan with steps that grow with the time since the start,
-    or of an eighth of a period, brackets the first zero.
+    or of an eighth of a period, brackets the first zero, or shows a dip that may reach it. No scan
+    is needed where there is but one.
     """
-    growth = 1.5
+    longest, quickest = math.inf, poles.second
     if poles.regime == UNDERDAMPED:
-        step, growth = 0.25 * math.pi / poles.second, 1.0
-    else:
-        step = 0.25 / max(-poles.second, slip.rate)
+        longest, quickest = EIGHTH * poles.scale, poles.first
+    step = 0.25 / max(-quickest, slip.rate)
     start = 0.0
+    bend = speed_and_acceleration(start, slip, poles)[1]
+    once = False
     while start < left:
-        end = min(start + step, left)
-        speed = direction * speed_and_acceleration(end, slip, poles)[0]
+        if armed and not once and poles.regime == OVERDAMPED:
+            one, two = free_motion(start, poles)
+            fall = math.exp(-slip.rate * start)
+            once = stops_once(slip, direction, delta, fall, one, two, poles)
+        end = left if once else min(start + min(step, longest), left)
+        speed, slope = speed_and_acceleration(end, slip, poles)
         level = delta if armed else 0.0
-        if speed < level or (armed and speed == level):
+        if direction * speed < level or (armed and direction * speed == level):
             return stop_between(start, end, slip, direction, level, poles), armed
-        armed = armed or speed > delta
-        start = end
-        step *= growth
+        if not once and direction * bend < 0.0 < direction * slope:
+            low = dip(start, end, slip, direction, level, poles)
+            if low >= 0.0:
+                return stop_between(start, low, slip, direction, level, poles), armed
+        armed = armed or direction * speed > delta
+        start, bend = end, slope
+        step *= 1.5
     return -1.0, armed
+
+
+@njit
+def dip(
+    start: float, end: float, slip: Slip, direction: float, level: float, poles: Poles
+) -> float:
+    """Return when a speed that falls at first and rises at last is below `level`, or -1."""
+    first, slope_first = speed_and_acceleration(start, slip, poles)
+    last, slope_last = speed_and_acceleration(end, slip, poles)
+    for _ in range(30):
+        when, low = lowest(
+            end - start,
+            direction * first,
+            direction * slope_first,
+            direction * last,
+            direction * slope_last,
+        )
+        when += start
+        if low > level or not start < when < end:
+            return -1.0
+        speed, slope = speed_and_acceleration(when, slip, poles)
+        if direction * speed < level:
+            return when
+        if direction * slope < 0.0:
+            start, first, slope_first = when, speed, slope
+        else:
+            end, last, slope_last = when, speed, slope
+    return -1.0
 
 
 @njit
@@ -154,7 +250,7 @@ def stop_between(
     start: float, end: float, slip: Slip, direction: float, level: float, poles: Poles
 ) -> float:
     """Return when the speed falls to `level` between two times: Newton, kept in its bracket."""
-    tolerance = 1e-15 * end
+    tolerance = 1e-9 * end  # a step of Newton squares what is left
     tau = 0.5 * (start + end)
     for _ in range(60):
         speed, acceleration = speed_and_acceleration(tau, slip, poles)
@@ -164,10 +260,8 @@ def stop_between(
         else:
             end = tau
         slope = direction * acceleration
-        guess = tau - above / slope if slope < 0.0 else start
-        if not start < guess < end:
-            guess = 0.5 * (start + end)
+        guess = tau - above / slope if slope < 0.0 else math.inf
         if abs(guess - tau) <= tolerance:
-            break
-        tau = guess
+            return guess
+        tau = guess if start < guess < end else 0.5 * (start + end)
     return tau

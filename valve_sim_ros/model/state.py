@@ -106,17 +106,30 @@ def lag_over(rate: float, dt: float, a_1: float, a_2: float, stiffness: float) -
 @njit
 def transition_over(dt: float, theta: Theta, finest: float) -> Transition:
     """Return what a sample of `dt` seconds needs, taken in steps of at most `finest` seconds."""
+    filling = lag_over(1.0 / theta.t_g1, 0.0, theta.a_1, theta.a_2, 1.0)
+    emptying = lag_over(1.0 / theta.t_g2, 0.0, theta.a_1, theta.a_2, 1.0)
+    poles = stem_poles(theta.a_1, theta.a_2)
+    phi1, phi2 = free_motion(0.0, poles)
+    still = Transition(0.0, 1, 0.0, filling, emptying, poles, phi1, phi2)
+    return transition_after(still, dt, finest)
+
+
+@njit
+def transition_after(before: Transition, dt: float, finest: float) -> Transition:
+    """Return the same over another sample, from what does not depend on its length."""
+    if dt == before.dt:
+        return before
     substeps = max(1, math.ceil(dt / finest))
     step = dt / substeps
-    poles = stem_poles(theta.a_1, theta.a_2)
-    phi1, phi2 = free_motion(step, poles)
+    filling, emptying = before.filling, before.emptying
+    phi1, phi2 = free_motion(step, before.poles)
     return Transition(
         dt,
         substeps,
         step,
-        lag_over(1.0 / theta.t_g1, step, theta.a_1, theta.a_2, 1.0),
-        lag_over(1.0 / theta.t_g2, step, theta.a_1, theta.a_2, 1.0),
-        poles,
+        Lag(filling.rate, math.exp(-step * filling.rate), filling.gain, filling.stem_rate),
+        Lag(emptying.rate, math.exp(-step * emptying.rate), emptying.gain, emptying.stem_rate),
+        before.poles,
         phi1,
         phi2,
     )

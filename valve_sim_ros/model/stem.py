@@ -90,18 +90,25 @@ def begin_slip(
 
 @njit
 def break_away(
-    x: float, target: float, excess: float, rate: float, left: float, friction: Friction
+    x: float,
+    target: float,
+    excess: float,
+    rate: float,
+    left: float,
+    decay: float,
+    friction: Friction,
 ) -> tuple[float, float, float]:
     """Return when a resting stem breaks away, `left` seconds if it does not before, and where to.
 
     The opening force is target + excess exp(-rate tau); the third value is its excess then.
+    `decay` is exp(-rate left).
     """
     spring = friction.stiffness * x
     up, down = spring + friction.static_up, spring - friction.static_down
     pressure = target + excess
     if not down <= pressure <= up:
         return 0.0, 1.0 if pressure > up else -1.0, excess
-    final = target + excess * math.exp(-rate * left)
+    final = target + excess * decay
     if down <= final <= up:
         return left, 0.0, excess
     level = up if final > up else down
@@ -119,13 +126,16 @@ def through_events(
     delta: float,
     forced: tuple[float, float],
     poles: Poles,
+    decay: float,
 ) -> Stem:
     """Advance the stem event by event; `stem_step` says what the arguments are."""
     rate = forced[1]
     left = duration
     for _ in range(MAX_EVENTS):
         if stem.direction == 0.0:
-            wait, direction, excess = break_away(stem.x, target, excess, rate, left, friction)
+            wait, direction, excess = break_away(
+                stem.x, target, excess, rate, left, decay, friction
+            )
             if wait >= left:
                 return stem
             left -= wait
@@ -140,6 +150,7 @@ def through_events(
             left -= stop
             if left <= 0.0:
                 return stem
+            decay = math.exp(-rate * left)
             continue
         fall = math.exp(-slip.rate * left)
         one, two = free_motion(left, poles)
@@ -198,11 +209,11 @@ def stem_step(
             return stem
     elif stem.armed:
         slip = begin_slip(stem, target, excess, friction, forced, poles)
-        if surely_moving(slip, stem.direction, delta, decay, phi1, phi2, poles):
+        if surely_moving(slip, stem.direction, delta, duration, decay, phi1, phi2, poles):
             return Stem(
                 slip_position(slip, decay, phi1, phi2),
                 slip_speed(slip, decay, phi1, phi2),
                 stem.direction,
                 True,
             )
-    return through_events(stem, target, excess, duration, friction, delta, forced, poles)
+    return through_events(stem, target, excess, duration, friction, delta, forced, poles, decay)

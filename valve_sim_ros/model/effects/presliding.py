@@ -98,15 +98,17 @@ def held(value: Any, state: Any, compliance: float, dt: float) -> Motion:
         return moved(value, Stem(x, 0.0, 0.0, False), value.p2)
     if level != begin:
         wait = -math.log((level - target) / excess) / rate
+    left = dt - wait
     stem = through_events(
         Stem(x, 0.0, direction, False),
         target,
         level - target,
-        dt - wait,
+        left,
         f,
         theta.delta,
         forced_gain(rate, theta.a_1, theta.a_2, f.stiffness),
         stem_poles(theta.a_1 * f.stiffness, theta.a_2),
+        math.exp(-rate * left),
     )
     return moved(value, stem, value.p2)
 

@@ -59,7 +59,8 @@ def motion(value: Any, state: Any, p: Any, memory: Any, dt: float) -> Motion:
     h = longest
     while left > NOTHING:
         if stem.direction == 0.0:
-            wait, direction, excess = break_away(stem.x, value.target, excess, rate, left, f)
+            fall = math.exp(-rate * left)
+            wait, direction, excess = break_away(stem.x, value.target, excess, rate, left, fall, f)
             if wait >= left:
                 break
             left -= wait
