@@ -16,6 +16,7 @@ from valve_sim_ros.diagnosis.base_valve import find_base, starting_valve
 from valve_sim_ros.diagnosis.bench import Bench
 from valve_sim_ros.diagnosis.descent import cost_of
 from valve_sim_ros.diagnosis.fitting import Fitter, Valve
+from valve_sim_ros.diagnosis.interleaving import interleaved
 from valve_sim_ros.diagnosis.intervals import intervals
 from valve_sim_ros.diagnosis.loosening import loosened
 from valve_sim_ros.diagnosis.readings import straightened
@@ -35,6 +36,26 @@ def test_the_bench_runs_the_same_valve_as_simulate():
     (result,) = bench.run(complete({**VALUES, 'p1_0': 0.0, 'p2_0': 0.0, 'x_0': 0.0}))
     for row, name in enumerate(('p1', 'p2', 'x')):
         np.testing.assert_allclose(result[row], record.output(name), rtol=0, atol=1e-9)
+
+
+def test_commands_are_put_in_order_between_samples():
+    time, sent = np.array([0.0, 1.0, 2.1, 3.0]), np.array([5.0, 6.0, 6.0, 7.0])
+    now, dt, u, rows = interleaved(time, sent, np.full(4, 0.25))
+    np.testing.assert_allclose(now, [0.0, 0.75, 1.0, 2.1, 2.775, 3.0])
+    np.testing.assert_allclose(dt, [0.0, 0.75, 0.25, 1.1, 0.675, 0.225])
+    assert u.tolist() == [5.0, 6.0, 6.0, 6.0, 7.0, 7.0]
+    assert rows.tolist() == [0, 2, 3, 5]
+    # late by half of the period that follows, the last one as long as that before it
+    now, _, u, _ = interleaved(time, sent, np.full(4, -0.5))
+    np.testing.assert_allclose(now, [0.0, 1.0, 1.55, 2.1, 3.0, 3.45])
+    assert u.tolist() == [5.0, 5.0, 6.0, 6.0, 6.0, 7.0]
+    # none overtakes another, and one that is on time needs no row of its own
+    now, _, u, _ = interleaved(time[:3], np.array([5.0, 6.0, 7.0]), np.array([0.0, -0.9, 0.5]))
+    np.testing.assert_allclose(now, [0.0, 1.0, 1.99, 1.99, 2.1])
+    assert u[[0, 1, 4]].tolist() == [5.0, 5.0, 7.0]
+    _, _, u, rows = interleaved(time, sent, np.zeros(4))
+    assert u.tolist() == sent.tolist()
+    assert rows.tolist() == [0, 1, 2, 3]
 
 
 def test_a_phase_moves_commands_between_samples():

@@ -154,7 +154,7 @@ class Bench:
         results = []
         for index in range(len(self.stretches)):
             outputs, grid, _ = self._run(index, values, effects, drive, 'x', math.inf)
-            results.append(outputs[:, grid.rows])
+            results.append(outputs.take(grid.rows, axis=1))
         return results
 
     def score(

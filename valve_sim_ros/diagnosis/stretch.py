@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from ..model.pipeline import Array
 from ..recordings.recording import OUTPUTS
+from .interleaving import interleaved, spread
 
 KEPT_GRIDS = 60
 RESTS, CAUGHT, ON_TIME, HELD = 'x', 'x caught', 'x caught on time', 'x held'
@@ -69,6 +70,7 @@ class Stretch:
     unsure: Rows = field(default_factory=lambda: np.empty(0, dtype=np.intp))
     sooner: Array = field(default_factory=lambda: np.empty(0))
     _grids: dict[Any, Grid] = field(default_factory=dict)
+    _samples: dict[tuple[str, ...], Array] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         """Keep the commands as the recording shows them."""
@@ -108,6 +110,7 @@ class Stretch:
     def recount(self, counts: Mapping[str, Array]) -> None:
         """Replace what counts."""
         self.counts = dict(counts)
+        self._samples.clear()
         self._grids.clear()
 
     def send(self, u: Array) -> None:
@@ -128,6 +131,8 @@ class Stretch:
 
     def hide(self, rows: Rows) -> None:
         """Let p1 say nothing where it answers the commands of some samples, at once or next."""
+        self._samples.clear()
+        self._grids.clear()
         rows = np.concatenate([rows, rows + 1])
         for each in (self.measured, self.counts):
             if 'p1' in each:
@@ -135,47 +140,42 @@ class Stretch:
                 each['p1'][rows[rows < self.time.size]] = np.nan
 
     def _moved(self, phase: float, drive: tuple[str, ...], blend: float, lead: float) -> Grid:
-        n = self.time.size
         sent = blended(self.u, blend) if blend else self.u
-        changed = np.flatnonzero(np.diff(sent)) + 1
-        sooner = self.sooner + lead * goes_on(sent) if lead else self.sooner
-        each = np.clip(phase + sooner[changed], EARLIEST, LATEST)
-        periods = np.diff(self.time, append=2 * self.time[-1] - self.time[-2])
-        came = self.time[changed] - each * np.where(each > 0.0, *periods[[changed - 1, changed]])
-        came = np.maximum.accumulate(came)
-        time = np.concatenate([self.time, came[each != 0.0]])
-        order = np.argsort(time, kind='stable')
-        received = np.searchsorted(came, time[order], 'right')
-        rows = np.empty(time.size, dtype=np.intp)
-        rows[order] = np.arange(time.size)
-        rows = rows[:n]
-        forced, nothing = np.full((3, time.size), np.nan), np.full(time.size, np.nan)
-        for name, values in self.begins.items():
-            forced[OUTPUTS.index(name), rows] = values
-        for name in drive:
-            if name == HELD:
-                # what a loop sees at the end of a step
-                forced[STEM] = np.interp(np.append(time[order][1:], np.inf), self.time, self.held)
-            elif name in PUT_TO_REST:
-                forced[STEM, rows] = self.rests
-            else:
-                forced[OUTPUTS.index(name), rows] = self.measured[name]
-        targets, scales = {}, {}
-        for name, values in self.counts.items():
-            targets[name], scales[name] = nothing.copy(), nothing.copy()
-            targets[name][rows] = values
-            scales[name][rows] = 1.0 / self.noise[name]
-        steps: Array = np.diff(time[order], prepend=time[order][:1])
-        steps = np.round(steps, 9)  # equal steps stay equal
+        ahead = lead * goes_on(sent) if lead else 0.0
+        sooner = np.clip(phase + self.sooner + ahead, EARLIEST, LATEST)
+        now, dt, u, rows = interleaved(self.time, sent, sooner)
+        at_rows = spread(self._at_samples(drive), rows, u.size)
+        if HELD in drive:
+            # what a loop sees at the end of a step
+            at_rows[STEM] = np.interp(np.append(now[1:], np.inf), self.time, self.held)
+        forced, targets, scales = np.split(
+            at_rows, [len(OUTPUTS), len(OUTPUTS) + len(self.counts)]
+        )
         return Grid(
-            np.concatenate([sent[:1], sent[changed]])[received],
-            steps,
+            u,
+            dt,
             rows,
             forced,
-            targets,
-            scales,
-            nothing,
+            dict(zip(self.counts, targets, strict=True)),
+            dict(zip(self.counts, scales, strict=True)),
+            np.full(u.size, np.nan),
         )
+
+    def _at_samples(self, drive: tuple[str, ...]) -> Array:
+        """Return what stages receive as measured, what counts, and one over its noise."""
+        found = self._samples.get(drive)
+        if found is None:
+            forced = np.full((len(OUTPUTS), self.time.size), np.nan)
+            for name, values in self.begins.items():
+                forced[OUTPUTS.index(name)] = values
+            for name in drive:
+                if name in PUT_TO_REST:
+                    forced[STEM] = self.rests
+                elif name != HELD:
+                    forced[OUTPUTS.index(name)] = self.measured[name]
+            scales = [1.0 / self.noise[name] for name in self.counts]
+            found = self._samples[drive] = np.vstack([forced, *self.counts.values(), *scales])
+        return found
 
 
 def blended(u: Array, share: float) -> Array:

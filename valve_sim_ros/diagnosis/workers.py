@@ -12,13 +12,34 @@ from typing import TypeVar
 Item = TypeVar('Item')
 Result = TypeVar('Result')
 
-RUNS = ThreadPoolExecutor(os.cpu_count())
-"""For runs only: they wait for nothing in this pool."""
+HELPERS = ThreadPoolExecutor(os.cpu_count())
+"""Threads that help with runs: they wait for nothing in this pool."""
 
 
 def at_once(run: Callable[[Item], Result], items: Iterable[Item]) -> list[Result]:
-    """Return what each run makes of its item, in order."""
-    return list(RUNS.map(run, items))
+    """Return what each run makes of its item, in order.
+
+    The caller takes items as well, each thread the next one that is left: handing over one item
+    at a time would cost as much as a short run.
+    """
+    each = list(items)
+    found: dict[int, Result] = {}
+    left = iter(range(len(each)))
+
+    def work() -> None:
+        for index in left:
+            found[index] = run(each[index])
+
+    helpers = [HELPERS.submit(work) for _ in range(min(len(each), os.cpu_count() or 1) - 1)]
+    try:
+        work()
+    finally:
+        for _ in left:
+            pass  # nothing more is begun once a run has failed
+        for helper in helpers:
+            if not helper.cancel():
+                helper.result()
+    return [found[index] for index in range(len(each))]
 
 
 def cheapest(
