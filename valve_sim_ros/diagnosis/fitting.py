@@ -25,12 +25,14 @@ SHORT, LONG = 4, 20
 SPREAD, NARROW, FINE = 5.0, 3.0, 1.0
 """Standard deviation with which an evolution begins, near an optimum, and where a train of slips
 hangs on every step [steps of unknowns]."""
+REFINING = NARROW, FINE, 0.3, 0.1
+"""The same for evolutions in turn that refine a valve: slips leave valleys of any width."""
 POPULATION = 14
 FAINT = 0.02
 """Excess up to which a train of slips is right; laborious effects leave more in a base valve."""
-GENERATIONS, PATIENT, MOST_TURNS = 40, 150, 3
-"""Generations of an evolution that refines a valve, and of one along a narrow valley; and most
-evolutions in turn."""
+GENERATIONS, PATIENT, MOST_TURNS, ENDS = 40, 150, 3, 0.99
+"""Generations of an evolution that refines a valve, and of one along a narrow valley; most
+evolutions in turn, which end where no more than a hundredth of the cost is gained."""
 
 
 @dataclass(frozen=True)
@@ -160,20 +162,29 @@ class Fitter:
         if 'f_s' not in (unknown.name for unknown in problem[0]):
             return valve
         _, signal, drive = problem
-        there = valve
-        strayed = leftover(self.residuals(valve, signal, drive)).excess > FAINT
-        for way in eased(problem) if strayed else ():
-            spread = FINE if way == problem else NARROW
-            there = self.fit(self.evolve(there, way, GENERATIONS, spread), way)
-        valve = min(valve, there, key=by_cost)
-        for spread in (NARROW, FINE):
-            for _ in range(MOST_TURNS):
-                more = self.evolve(valve, problem, GENERATIONS, spread)
-                more = self.fit(more, problem)
-                ends = more.cost > 0.99 * valve.cost
-                valve = min(valve, more, key=by_cost)
-                if ends:
-                    break
+        for turn in range(MOST_TURNS):
+            strayed = leftover(self.residuals(valve, signal, drive)).excess > FAINT
+            if turn and not strayed:
+                break
+            before, there = valve.cost, valve
+            for way in eased(problem) if strayed else ():
+                spread = FINE if way == problem else NARROW
+                there = self.fit(self.evolve(there, way, GENERATIONS, spread), way)
+            valve = min(valve, there, key=by_cost)
+            for spread in REFINING:
+                valve = self._evolved(valve, problem, spread)
+            if valve.cost > ENDS * before:
+                break
+        return valve
+
+    def _evolved(self, valve: Valve, problem: Problem, spread: float) -> Valve:
+        """Return a valve after evolutions, as long as they gain."""
+        for _ in range(MOST_TURNS):
+            before = valve.cost
+            more = self.fit(self.evolve(valve, problem, GENERATIONS, spread), problem)
+            valve = min(valve, more, key=by_cost)
+            if more.cost > ENDS * before:
+                break
         return valve
 
     def problem(self, group: Group, valve: Valve) -> Problem:

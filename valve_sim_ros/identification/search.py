@@ -76,9 +76,12 @@ def _race(problem: Problem, seed: int, watch: Watch) -> End:
 
 
 def refit(problem: Problem, point: Array, watch: Watch | None = None) -> End:
-    """Go down from the optimum of much the same data; hop only if it stays above the noise."""
+    """Go down from the optimum of much the same data; search anew if it stays above the noise."""
+    watch = watch or Watch()
     end = polish(problem, point, watch)
-    return _hops(problem, end, watch or Watch()) if doubted(end) else end
+    if not doubted(end):
+        return end
+    return best_of([_hops(problem, end, watch), _race(problem, 0, watch)], 1)[0]
 
 
 def doubted(end: End) -> bool:
