@@ -28,8 +28,9 @@ hangs on every step [steps of unknowns]."""
 REFINING = NARROW, FINE, 0.3, 0.1
 """The same for evolutions in turn that refine a valve: slips leave valleys of any width."""
 POPULATION = 14
-FAINT = 0.02
-"""Excess up to which a train of slips is right; laborious effects leave more in a base valve."""
+FAINT, NEAR = 0.02, 1.0
+"""Excess up to which a train of slips is right (laborious effects leave more in a base valve), and
+up to which a valve is refined again and again, with fine steps as well."""
 GENERATIONS, PATIENT, MOST_TURNS, ENDS = 40, 150, 3, 0.99
 """Generations of an evolution that refines a valve, and of one along a narrow valley; most
 evolutions in turn, which end where no more than a hundredth of the cost is gained."""
@@ -163,15 +164,15 @@ class Fitter:
             return valve
         _, signal, drive = problem
         for turn in range(MOST_TURNS):
-            strayed = leftover(self.residuals(valve, signal, drive)).excess > FAINT
-            if turn and not strayed:
+            left = leftover(self.residuals(valve, signal, drive)).excess
+            if turn and not FAINT < left <= NEAR:
                 break
             before, there = valve.cost, valve
-            for way in eased(problem) if strayed else ():
+            for way in eased(problem) if left > FAINT else ():
                 spread = FINE if way == problem else NARROW
                 there = self.fit(self.evolve(there, way, GENERATIONS, spread), way)
             valve = min(valve, there, key=by_cost)
-            for spread in REFINING:
+            for spread in REFINING if left <= NEAR else REFINING[:2]:
                 valve = self._evolved(valve, problem, spread)
             if valve.cost > ENDS * before:
                 break
