@@ -97,6 +97,7 @@ def pushed(
         dt,
     )
     poles, phi1, phi2 = transition.poles, transition.phi1, transition.phi2
+    # written so that it falls away in a valve without effects: != may be true of NaN
     if rate < lag.rate or rate > lag.rate or friction.stiffness != 1.0:
         lag = lag_over(rate, dt, theta.a_1, theta.a_2, friction.stiffness)
     if friction.stiffness != 1.0:
