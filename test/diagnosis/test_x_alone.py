@@ -41,7 +41,7 @@ def candidates(*effects):
 def test_base_valves_are_found_at_the_end_of_a_narrow_valley():
     """A stem that creeps imitates one that slips: lags and friction change together in between.
 
-    So narrow is it that the noise decides whether a search hits it: 10 of draws 3 to 18 were found.
+    So narrow is it that the noise decides whether a search hits it: 10 of draws 3 to 18 were.
     """
     rng = np.random.default_rng(3)
     ends = np.concatenate([[40.0], rng.uniform(10.0, 90.0, 12)])
