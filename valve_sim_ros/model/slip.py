@@ -12,7 +12,7 @@ from numba import njit
 
 OVERDAMPED, CRITICAL, UNDERDAMPED = 0, 1, 2
 EIGHTH = 0.25 * math.pi
-"""An eighth of a period of a swing: nothing happens within less [rad]."""
+"""Longest step of a scan for the stop of a swing, an eighth of its period [rad]."""
 
 
 class Poles(NamedTuple):
