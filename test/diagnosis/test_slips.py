@@ -14,7 +14,7 @@ from valve_sim_ros.diagnosis.base_valve import find_base, on_time, starting_valv
 from valve_sim_ros.diagnosis.bench import Bench
 from valve_sim_ros.diagnosis.fitting import Fitter, Valve
 from valve_sim_ros.diagnosis.proof import prove
-from valve_sim_ros.diagnosis.seen import dwell_seen, shaken_seen
+from valve_sim_ros.diagnosis.seen import dwell_seen, shaken_seen, stops_seen
 from valve_sim_ros.diagnosis.stages import groups
 from valve_sim_ros.diagnosis.stretch import CAUGHT
 from valve_sim_ros.diagnosis.unknowns import complete
@@ -85,6 +85,19 @@ def test_the_moments_of_slips_show_what_shakes_the_stem():
         assert start['vibration.frequency'] == pytest.approx(0.51, abs=3e-4)
         assert start['vibration.phase'] == pytest.approx(1.0, abs=0.8)
         assert start['f_s'] > held
+
+
+@pytest.mark.parametrize('stops', [{}, {'lower': 38.0}, {'upper': 52.0}])
+def test_what_holds_the_stem_at_a_stop_only_is_no_friction(stops):
+    there = {f'travel_stops.{name}': place for name, place in stops.items()}
+    far = {'travel_stops.lower': -60.0, 'travel_stops.upper': 160.0}
+    bench = shaken(('travel_stops',), **far | there)
+    results = bench.run(complete({**VALUES, **STARTING}), (), ('p1', 'p2'))
+    starts = stops_seen(bench, results)
+    assert len(starts) == len(stops)
+    for start in starts:
+        assert start.pop('f_s') == pytest.approx(VALUES['f_s'], abs=0.8)
+        assert start == pytest.approx(there, abs=0.1)
 
 
 def test_a_swing_at_every_sample_is_no_noise():

@@ -14,7 +14,7 @@ import pytest
 from valve_sim_ros import InitialState, ModelError, read_parameters, simulate, Valve, ValveSpec
 from valve_sim_ros.model import kernels, pipeline
 from valve_sim_ros.model.electro_pneumatic import backlash
-from valve_sim_ros.model.slip import forced_gain, free_motion, stem_poles
+from valve_sim_ros.model.slip import first_stop, forced_gain, free_motion, Slip, stem_poles
 from valve_sim_ros.model.stem import Friction, Stem, stem_step
 from valve_sim_ros.model.tables import parameter_table, sample_file
 
@@ -223,6 +223,23 @@ def test_a_step_in_one_and_in_many_parts_agree():
             left *= math.exp(-rate * duration / parts)
         at_once = stem_after(duration, target, excess, *valve, stem=begun)
         assert at_once.x == pytest.approx(after.x, abs=1e-6), (damping, duration, begun, valve)
+
+
+def test_rounding_does_not_end_a_slip_that_only_begins():
+    """Each slip at the edge of friction would end at once, hundreds of times a step."""
+    poles = stem_poles(3999999.9999999953, 19999.999999999985)
+    slip = Slip(
+        base=23.7978461438425,
+        forced=0.0032255500664604853,
+        rate=0.9581572658909195,
+        c1=-1.5453782729241474e-05,
+        c2=1.6018787532419602e-09,
+        d1=0.0031222981625074657,
+        d2=-3.1713929833413526e-05,
+    )
+    stop, armed = first_stop(slip, -1.0, False, 1e-5, 0.0179, poles)
+    assert stop == -1.0
+    assert armed
 
 
 @pytest.mark.parametrize(

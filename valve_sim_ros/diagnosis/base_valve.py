@@ -49,11 +49,13 @@ def find_base(
     *,
     roughly: bool = False,
     closely: bool = False,
+    carried: float = 0.0,
 ) -> Valve:
     """Find the base valve's values in one group from a grid, `drive` as measured.
 
     `roughly` leaves out the long searches, where the values are sought anew later; `closely` does
-    them even where nothing but noise is left.
+    them even where nothing but noise is left. Nor are they done where no more is left than the
+    signals before `carried` on.
     """
     if group.stages == ('u-p1',) and drive == group.drive:
         _settle_phase(fitter, group, valve)
@@ -100,7 +102,8 @@ def find_base(
     best = fitter.fit(found[0], problem)
     left = leftover(fitter.residuals(best, group.signal, drive))
     smeared = len(group.stages) > 1 and left.mean_square > odds.COLOURED  # no window is quiet
-    if not (closely or smeared or odds.suspicious(left, group, fitter.bench.mixed)):
+    worth = odds.suspicious(left, group, fitter.bench.mixed) and not odds.carried_on(left, carried)
+    if not (closely or smeared or worth):
         return best
     # caught where it is far from its rest, a stem that slips too late is only a little wrong
     way = eased(problem)[0]
@@ -202,11 +205,13 @@ def on_other_side(fitter: Fitter, group: Group, valve: Valve) -> Valve:
         return valve
     fitter.phase = LATE if phase == EARLY else EARLY
     there = replace(valve, values={**valve.values, 'phase': min(fitter.phase.upper, 0.0)})
-    there = fitter.fit(there, fitter.problem(group, there))
-    if there.cost < valve.cost - CLEARLY:
-        return there
-    fitter.phase = phase
-    return valve
+    better = False
+    try:
+        there = fitter.fit(there, fitter.problem(group, there))
+        better = there.cost < valve.cost - CLEARLY
+    finally:  # so that an end here leaves a valve and a phase that belong together
+        fitter.phase = fitter.phase if better else phase
+    return there if better else valve
 
 
 def _settle_phase(fitter: Fitter, group: Group, valve: Valve) -> None:

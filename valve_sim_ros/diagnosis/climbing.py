@@ -6,6 +6,7 @@ from collections.abc import Callable, Collection, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from functools import partial
+import math
 
 from ..identification.watch import Progress, Stop
 from . import dead_time, odds
@@ -51,9 +52,11 @@ def climb_all(
         )
         candidates = () if blind else group.candidates(known)
         drive = fitter.drive
-        if 'x' in fitter.bench.signals and not group.has_stem:
-            # the stem may act on these stages: a positioner, the chamber's volume
-            fitter.drive = (*drive, HELD)
+        if not group.has_stem:
+            with suppress(*stops):
+                fitter.drive = _best_drive(fitter, group, valve, ladders)
+            # behind a law that is not quite right, what it leaves would be sought again
+            drive = tuple(each for each in fitter.drive if each != HELD)
         carried = max((each.after.excess for each in ladders), default=0.0)
         ladder = climb(
             fitter,
@@ -170,6 +173,33 @@ def _let_go(fitter: Fitter, ladder: Ladder, guess: Rung | None) -> Ladder | None
 def _within(tell: Progress, start: float, width: float, text: str) -> Callable[[float], object]:
     """Return how to tell the progress of a part of the work."""
     return lambda done: tell(start + width * done, text)
+
+
+def _best_drive(
+    fitter: Fitter, group: Group, valve: Valve, ladders: Sequence[Ladder]
+) -> tuple[str, ...]:
+    """Return what drives a group as measured: what explains most, if an effect comes before it.
+
+    The stem may act on these stages (a positioner, the chamber's volume), but as measured nobody
+    knows it between its samples. Nor does a law that is not quite right drive them best.
+    """
+    modelled = fitter.drive
+    held = (HELD,) if 'x' in fitter.bench.signals else ()
+    drives = [(*modelled, *held)]
+    if any(ladder.rungs for ladder in ladders):
+        inexact = [each.group.signal for each in ladders if each.after.excess > odds.SPOTLESS]
+        for signals in ((), tuple(inexact)):
+            drives += [(*modelled, *signals, *held), (*modelled, *signals)]
+    drives = list(dict.fromkeys(drives))
+    best, least = drives[0], math.inf
+    for drive in drives if len(drives) > 1 else ():
+        found = find_base(fitter, group, valve, drive, roughly=True)
+        left = leftover(fitter.residuals(found, group.signal, drive)).excess
+        if left < least:
+            best, least = drive, left
+        if least <= odds.SPOTLESS:
+            break
+    return best
 
 
 def _refitted(fitter: Fitter, group: Group, valve: Valve) -> Valve:

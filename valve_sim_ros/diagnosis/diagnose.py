@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """From recordings to a verdict: find, name, add, show."""
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 import math
@@ -19,7 +19,7 @@ from .bench import Bench
 from .climbing import climb_all
 from .conditions import Place, places
 from .errors import DiagnosisError
-from .fitting import Fitter, Valve
+from .fitting import Fitter, go_on, Valve
 from .intervals import intervals
 from .ladder import concluded, Ladder
 from .odds import COARSE
@@ -96,7 +96,9 @@ def diagnose(
         raise DiagnosisError(
             'stopped before the base valve was fitted; let it run a little longer'
         ) from None
-    ladders, base = climb_all(fitter, parts, valve, without, _until(end, tell), stops)
+    fitter.alive = _until(end)
+    ladders, base = climb_all(fitter, parts, valve, without, tell, stops)
+    fitter.alive = go_on
     ladders, late = dead_time.settled(fitter, ladders)
     tell = _heedless(tell)
     augmented = ladders[-1].valve
@@ -134,15 +136,14 @@ def _silent(share: float, text: str) -> None:
     """Tell nobody."""
 
 
-def _until(end: float, tell: Progress) -> Progress:
-    """Return how to tell what may be stopped, and to stop it at a time [s]."""
+def _until(end: float) -> Callable[[], None]:
+    """Return what to call before each search, which stops it after a time [s]."""
 
-    def told(share: float, text: str) -> None:
-        tell(share, text)
+    def alive() -> None:
         if time.monotonic() > end:
             raise Stop
 
-    return told
+    return alive
 
 
 def _heedless(tell: Progress) -> Progress:

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Fits of one group of stages, from one start or from several."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 import math
 
@@ -66,9 +66,16 @@ def by_cost(valve: Valve) -> float:
     return valve.cost
 
 
+def go_on() -> None:
+    """Never end a search."""
+
+
 @dataclass
 class Fitter:
-    """Fits valves to what a bench has measured."""
+    """Fits valves to what a bench has measured.
+
+    `alive` is called before every search, from any thread, and may raise `Stop`.
+    """
 
     bench: Bench
     phase: Unknown = PHASE
@@ -76,6 +83,7 @@ class Fitter:
     lead: bool = False
     drive: tuple[str, ...] = ()
     seed: int = 0
+    alive: Callable[[], object] = go_on
 
     def unknowns(self, group: Group) -> tuple[Unknown, ...]:
         """Return what a fit of the base valve varies in a group."""
@@ -114,6 +122,7 @@ class Fitter:
 
     def fit(self, valve: Valve, problem: Problem, most: int = LONG) -> Valve:
         """Return the valve at the bottom of the valley in which it stands."""
+        self.alive()
         unknowns, signal, drive = problem
 
         def residuals(point: Array) -> Array:
@@ -139,6 +148,7 @@ class Fitter:
         spread: float = SPREAD,
     ) -> Valve:
         """Return the best valve that evolution finds around this one."""
+        self.alive()
         unknowns, signal, drive = problem
 
         def score(point: Array, bound: float) -> float:
@@ -201,6 +211,7 @@ class Fitter:
         count: int = 1,
     ) -> list[Valve]:
         """Return the best starts, best first."""
+        self.alive()
         _, signal, drive = problem
         there = [replace(valve, values=start) for start in starts]
         costs = cheapest(lambda each, bound: self.score(each, signal, drive, bound), there, count)

@@ -17,7 +17,7 @@ from .loosening import loosened
 from .race import race, rebased
 from .rung import judged, Rung
 from .stages import Candidate, Group
-from .stretch import PUT_TO_REST
+from .stretch import HELD, PUT_TO_REST
 
 MOST_EFFECTS = 2
 """Most effects named in one group of stages."""
@@ -98,7 +98,7 @@ def climb(
         return replace(there, cost=cost), leftover(fitter.residuals(there, group.signal))
 
     def worth(left: Leftover) -> bool:
-        if carried > odds.SPOTLESS and left.excess <= carried:
+        if odds.carried_on(left, carried):
             return False
         if rungs:
             return odds.unfinished(left, odds.MORE_EXCESS)
@@ -120,7 +120,7 @@ def climb(
         if left is not chance and worth(left):
             return candidates
         hidden = group.stages == ('p2-x',) and not (rungs or named or carried > odds.SPOTLESS)
-        stepped = not (rungs or left is chance) and bool(fitter.bench.steps_of_x)
+        stepped = not (rungs or left is chance) and _keeps_to_steps(fitter, group, now)
         return [
             each
             for each in candidates
@@ -135,7 +135,7 @@ def climb(
     with suppress(*stops):
         progress(0.0)
         if refit:
-            now, before = seen(find_base(fitter, group, valve, fitter.drive))
+            now, before = seen(find_base(fitter, group, valve, fitter.drive, carried=carried))
             modelled = group.has_stem and group.drive and not fitter.drive
             if modelled and before.excess > odds.SPOTLESS:
                 loose, left = seen(loosened(fitter, group, now))
@@ -165,8 +165,9 @@ def climb(
                 rung = judged(fitter, group, now, before, runners)
             if rung is None or rung.effect not in {each.effect for each in sought(before)}:
                 break
-            rung = _with(fitter, group, rung, on_other_side(fitter, group, rung.valve))
-            rung = _on_time(fitter, group, rung)
+            with suppress(*stops):  # an end here leaves the name as it is
+                rung = _with(fitter, group, rung, on_other_side(fitter, group, rung.valve))
+                rung = _on_time(fitter, group, rung)
             gained, first = rung.gains[rung.effect], not rungs
             if not odds.strong(
                 group.signal, before, gained, rung.closed, first=first, named=named
@@ -190,6 +191,8 @@ def climb(
                     break
             rungs.append(rung)
             now, before = rung.valve, rung.after  # first, so that an end here loses nothing
+            rung = rungs[-1] = _with_its_own_stem(fitter, group, rung)
+            before = rung.after
             rest = chance_apart(now, before)
             if rest is not before:
                 before = rest
@@ -219,6 +222,30 @@ def _with(fitter: Fitter, group: Group, rung: Rung, valve: Valve) -> Rung:
         return rung
     after = leftover(fitter.residuals(valve, group.signal))
     return replace(rung, valve=valve, after=after, closed=rung.before.closed_by(after))
+
+
+def _with_its_own_stem(fitter: Fitter, group: Group, rung: Rung) -> Rung:
+    """Return a step with what its valve leaves beside its own stem, if that is less.
+
+    As measured nobody knows the stem between its samples.
+    """
+    drive = tuple(each for each in fitter.drive if each != HELD)
+    after = leftover(fitter.residuals(rung.valve, group.signal, drive))
+    if after.excess >= rung.after.excess:
+        return rung
+    return replace(rung, after=after, closed=rung.before.closed_by(after))
+
+
+def _keeps_to_steps(fitter: Fitter, group: Group, valve: Valve) -> bool:
+    """Tell whether x, where it seems to keep to steps, is better explained by a coarse sensor."""
+    if not group.has_stem:
+        return False
+    rounding = replace(valve, effects=tuple(dict.fromkeys((*valve.effects, odds.COARSE))))
+    each = [
+        replace(rounding, values={**valve.values, f'{odds.COARSE}.step': step})
+        for step in fitter.bench.steps_of_x
+    ]
+    return any(fitter.score(one, group.signal, fitter.drive) < valve.cost for one in each)
 
 
 def _imitated(effect: str, base: Valve) -> bool:

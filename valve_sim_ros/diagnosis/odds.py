@@ -147,6 +147,11 @@ def size(valve: Valve) -> float:
     return max(sizes, default=1.0)
 
 
+def carried_on(left: Leftover, carried: float) -> bool:
+    """Tell whether no more is left than the excess `carried` on from the signals before."""
+    return carried > SPOTLESS and left.excess <= carried
+
+
 def unfinished(left: Leftover, least: float) -> bool:
     """Tell whether what the effects found so far leave makes it worth to look for another."""
     return left.excess >= least or left.far >= MORE_FAR

@@ -24,6 +24,8 @@ from .seen import (
     friction_seen,
     shaken_seen,
     SHAKES,
+    STOPS,
+    stops_seen,
 )
 from .single_slips import slip_by_slip
 from .stages import Candidate, Group
@@ -89,6 +91,7 @@ def race(
         shown = {
             DWELL: dwell_seen(fitter.bench, results),
             SHAKES: shaken_seen(fitter.bench, held),
+            STOPS: stops_seen(fitter.bench, results),
         }
     done = 0
 
@@ -294,7 +297,8 @@ def _screened(
     usual = {**candidate.neutral, **valve.values}
     if len(own) > MOST_STARTS:
         costs = [fitter.scan(there, [{**usual, **start}], way)[0].cost for start in own]
-        own = [own[index] for index in np.argsort(costs, kind='stable')[:FEWER_STARTS]]
+        # of those that act at the same sample one is enough
+        own = [own[index] for index in np.unique(costs, return_index=True)[1][:FEWER_STARTS]]
     own = [*own, *suited]
 
     levels = [level for level in (usual['f_s'], held) if level > 0.0]

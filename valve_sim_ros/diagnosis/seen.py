@@ -29,6 +29,9 @@ LEAST_RESTS = 20
 """Samples at rest that show what holds the stem."""
 DWELL, DWELLS, SCATTER = 'dwell_friction', tuple(np.geomspace(0.5, 200.0, 16).tolist()), 0.2
 """The effect, time constants that are tried [s], and how far what holds the stem scatters [%]."""
+STOPS, OUTERMOST, BEYOND = 'travel_stops', 0.01, 1.0
+"""The effect, the share of rests that may lie beyond a stop, and by how much more is left unmoved
+there than holds the stem elsewhere [% of span]."""
 SHAKES, AMPLITUDES = 'vibration', (0.4, 1.0, 2.5)
 """The effect, and amplitudes from which a search starts [% of span]."""
 EARLY, CARRIED = (-0.6, 0.0), (0.2, 0.8)
@@ -144,6 +147,36 @@ def shaken_seen(bench: Bench, held: float) -> list[dict[str, float]]:
         for early in EARLY
         for share in CARRIED
     ]
+
+
+def stops_seen(bench: Bench, results: Sequence[Array]) -> list[dict[str, float]]:
+    """Return starts of stops: the outermost places of rest, and what holds the stem elsewhere.
+
+    `results` as for `friction_seen`; none if p2 moves the stem there as it does elsewhere.
+    """
+    pairs = zip(bench.stretches, results, strict=True)
+    each = [(s.rests, result[1] - s.rests) for s, result in pairs if s.rests.size]
+    rests, force = (np.concatenate([*some, np.empty(0)]) for some in zip(*each, strict=True))
+    known = np.isfinite(rests) & np.isfinite(force)
+    rests, force = rests[known], force[known]
+    if rests.size < LEAST_RESTS:
+        return []
+    found: dict[str, float] = {}
+    there = np.zeros(rests.size, dtype=bool)
+    for name, way, share in (('lower', -1.0, OUTERMOST), ('upper', 1.0, 1.0 - OUTERMOST)):
+        level = float(np.quantile(rests, share, method='nearest'))
+        near = np.abs(rests - level) < LEAVES * bench.noise['x']
+        if near.all():
+            return []
+        if (way * force)[near].max() > np.quantile((way * force)[~near], 0.995) + BEYOND:
+            found[f'{STOPS}.{name}'] = float(np.median(rests[near]))
+            there |= near
+    if there.all():
+        return []
+    low, high = np.quantile(force[~there], (0.005, 0.995))
+    starts = [{name: value} for name, value in found.items()]
+    starts += [found] if len(found) > 1 else []
+    return [{**start, 'f_s': float(high - low) / 2.0} for start in starts]
 
 
 def _left(bench: Bench, stretch: Stretch) -> list[tuple[int, int, float]]:

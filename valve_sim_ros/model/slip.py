@@ -11,6 +11,8 @@ from typing import NamedTuple
 from numba import njit
 
 OVERDAMPED, CRITICAL, UNDERDAMPED = 0, 1, 2
+BACKWARD = 1e-9
+"""So much speed against its direction [%/s] is rounding and does not end a slip that begins."""
 EIGHTH = 0.25 * math.pi
 """Longest step of a scan for the stop of a swing, an eighth of its period [rad]."""
 
@@ -204,7 +206,7 @@ def first_stop(
             once = stops_once(slip, direction, delta, fall, one, two, poles)
         end = left if once else min(start + min(step, longest), left)
         speed, slope = speed_and_acceleration(end, slip, poles)
-        level = delta if armed else 0.0
+        level = delta if armed else -BACKWARD
         if direction * speed < level or (armed and direction * speed == level):
             return stop_between(start, end, slip, direction, level, poles), armed
         if not once and direction * bend < 0.0 < direction * slope:
