@@ -14,10 +14,11 @@ from valve_sim_ros.diagnosis.base_valve import find_base, on_time, starting_valv
 from valve_sim_ros.diagnosis.bench import Bench
 from valve_sim_ros.diagnosis.fitting import Fitter, Valve
 from valve_sim_ros.diagnosis.proof import prove
-from valve_sim_ros.diagnosis.seen import dwell_seen, shaken_seen, stops_seen
+from valve_sim_ros.diagnosis.seen import drift_seen, dwell_seen, shaken_seen, stops_seen
 from valve_sim_ros.diagnosis.stages import groups
 from valve_sim_ros.diagnosis.stretch import CAUGHT
 from valve_sim_ros.diagnosis.unknowns import complete
+from valve_sim_ros.model.drift import drifted
 from valve_sim_ros.model.effects.dwell_friction import SHAPES
 from valve_sim_ros.recordings.quality import roughness
 from valve_sim_ros.recordings.recording import Recording
@@ -64,13 +65,15 @@ def test_rests_of_all_lengths_show_how_friction_grows(which):
 SHAKES = {'vibration.amplitude': 0.6, 'vibration.frequency': 0.51, 'vibration.phase': 1.0}
 
 
+SLOW = {**VALUES, 'T_g1': 6.0, 'T_g2': 8.0, **dict.fromkeys(STARTING, 40.0)}
+
+
 def shaken(effects, **values):
     """Return the bench of a valve that creeps up and down by small slips behind a slow chamber."""
     rng = np.random.default_rng(5)
     u = np.repeat(30.0 + 30.0 * rng.random(60), rng.integers(40, 160, 60))
-    there = {**VALUES, 'T_g1': 6.0, 'T_g2': 8.0, **dict.fromkeys(STARTING, 40.0), **values}
     bench = Bench([Recording(0.2 * np.arange(u.size), u, p1=u)])
-    (truth,) = bench.run(complete(there), effects)
+    (truth,) = bench.run(complete({**SLOW, **values}), effects)
     noisy = truth[:3] + 0.2 * rng.standard_normal((3, u.size))
     return Bench([Recording(0.2 * np.arange(u.size), u, *noisy)])
 
@@ -87,12 +90,29 @@ def test_the_moments_of_slips_show_what_shakes_the_stem():
         assert start['f_s'] > held
 
 
+@pytest.mark.parametrize(('rate', 'settling'), [(0.0, 0.0), (1.5, 0.0), (6.0, 8.0)])
+def test_what_holds_the_stem_early_and_late_shows_how_friction_drifts(rate, settling):
+    there = {'friction_drift.rate': rate, 'friction_drift.settling': settling}
+    bench = shaken(('friction_drift',), **there)
+    results = bench.run(complete(SLOW))
+    starts = drift_seen(bench, results)
+    assert bool(starts) == bool(rate)
+    for start in starts[bool(settling) :]:  # a line is not told from what hardly settles
+        for time in (0.0, bench.stretches[0].time[-1]):
+            held, told = (
+                law['f_s'] * (1.0 + law['friction_drift.rate'] * drifted(time, settles))
+                for law in ({**VALUES, **there}, start)
+                for settles in [law['friction_drift.settling']]
+            )
+            assert told == pytest.approx(held, rel=0.15)
+
+
 @pytest.mark.parametrize('stops', [{}, {'lower': 38.0}, {'upper': 52.0}])
 def test_what_holds_the_stem_at_a_stop_only_is_no_friction(stops):
     there = {f'travel_stops.{name}': place for name, place in stops.items()}
     far = {'travel_stops.lower': -60.0, 'travel_stops.upper': 160.0}
     bench = shaken(('travel_stops',), **far | there)
-    results = bench.run(complete({**VALUES, **STARTING}), (), ('p1', 'p2'))
+    results = bench.run(complete(SLOW))
     starts = stops_seen(bench, results)
     assert len(starts) == len(stops)
     for start in starts:

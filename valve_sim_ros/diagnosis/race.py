@@ -19,6 +19,8 @@ from .base_valve import find_base, with_any_stem
 from .fitting import by_cost, eased, FAINT, Fitter, LONG, Problem, SHORT, Valve
 from .seen import (
     calibration_seen,
+    DRIFT,
+    drift_seen,
     DWELL,
     dwell_seen,
     friction_seen,
@@ -89,6 +91,7 @@ def race(
             # a play of the converter may have made up for friction
             frictions += [{**each, 'f_d1': START['f_d1']} for each in frictions]
         shown = {
+            DRIFT: drift_seen(fitter.bench, results),
             DWELL: dwell_seen(fitter.bench, results),
             SHAKES: shaken_seen(fitter.bench, held),
             STOPS: stops_seen(fitter.bench, results),

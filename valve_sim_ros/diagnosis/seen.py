@@ -8,6 +8,7 @@ import math
 import numpy as np
 from scipy.optimize import least_squares
 
+from ..model.drift import drifted
 from ..model.effects.dwell_friction import SHAPES
 from ..model.pipeline import Array
 from .bench import Bench
@@ -29,6 +30,9 @@ LEAST_RESTS = 20
 """Samples at rest that show what holds the stem."""
 DWELL, DWELLS, SCATTER = 'dwell_friction', tuple(np.geomspace(0.5, 200.0, 16).tolist()), 0.2
 """The effect, time constants that are tried [s], and how far what holds the stem scatters [%]."""
+DRIFT, SETTLINGS, TOLD_BETTER = 'friction_drift', (0.0, *np.geomspace(2.0, 40.0, 8).tolist()), 0.5
+"""The effect, rates at which it settles that are tried [1/h], and the part of what scatters that
+it leaves at most."""
 STOPS, OUTERMOST, BEYOND = 'travel_stops', 0.01, 1.0
 """The effect, the share of rests that may lie beyond a stop, and by how much more is left unmoved
 there than holds the stem elsewhere [% of span]."""
@@ -81,8 +85,8 @@ def dwell_seen(bench: Bench, results: Sequence[Array]) -> list[dict[str, float]]
     it, the time constant is tried. `results` as for `friction_seen`; none if rests are few.
     """
     pairs = zip(bench.stretches, results, strict=True)
-    each = [_rests(bench, s, result) for s, result in pairs if s.rests.size]
-    rest, force = np.concatenate([*each, np.empty((0, 2))]).T
+    each = [_rests(bench, s, result) for s, result in pairs]
+    rest, force, _ = np.abs(np.concatenate([*each, np.empty((0, 3))])).T
     if rest.size < LEAST_LEFT:
         return []
     found = []
@@ -102,6 +106,38 @@ def dwell_seen(bench: Bench, results: Sequence[Array]) -> list[dict[str, float]]
                 values = {'growth': more / f_s, 'time_constant': time_constant, 'shape': shape}
                 best = {'f_s': f_s, **{f'{DWELL}.{name}': v for name, v in values.items()}}
         found += [best] if best else []
+    return found
+
+
+def drift_seen(bench: Bench, results: Sequence[Array]) -> list[dict[str, float]]:
+    """Return starts of a friction that changes through the record, one for each form of its law.
+
+    From what holds the stem when it leaves each rest: it is straight in the drift, how soon that
+    settles is tried. `results` as for `friction_seen`; none if it does not follow the time.
+    """
+    # each stretch begins anew
+    _, force, time = _rests(bench, bench.stretches[0], results[0]).T
+    if force.size < LEAST_LEFT:
+        return []
+    way = np.sign(force)
+
+    def fitted(grown: Array) -> tuple[float, float, float]:
+        """Return static friction, its change with what is grown, and what scatters."""
+
+        def missing(level: Array) -> Array:
+            return level[0] + way * (level[1] + level[2] * grown) - force
+
+        start = (0.0, np.median(np.abs(force)), 0.0)
+        fit = least_squares(missing, start, loss='cauchy', f_scale=SCATTER)
+        return float(fit.x[1]), float(fit.x[2]), float(fit.cost)
+
+    constant = fitted(np.zeros(time.size))[2]
+    found = []
+    for some in (SETTLINGS[:1], SETTLINGS[1:]):
+        laws = [(*fitted(np.array([drifted(t, k) for t in time])), k) for k in some]
+        f_s, more, left_over, settling = min(laws, key=lambda law: law[2])
+        if f_s > 0.0 and left_over < TOLD_BETTER * constant:
+            found.append({'f_s': f_s, f'{DRIFT}.rate': more / f_s, f'{DRIFT}.settling': settling})
     return found
 
 
@@ -196,15 +232,18 @@ def _left(bench: Bench, stretch: Stretch) -> list[tuple[int, int, float]]:
 
 
 def _rests(bench: Bench, stretch: Stretch, result: Array) -> Array:
-    """Return how long each rest lasted [s] and what then held the stem [%], shape (n, 2)."""
-    near = LEAVES * bench.noise['x']
+    """Return how long each rest lasted, what then held the stem, and when, shape (n, 3).
+
+    In s, % of span (positive if the stem opens), s since the first sample.
+    """
+    near, time = LEAVES * bench.noise['x'], stretch.time
     found = []
-    for first, left, level in _left(bench, stretch):
+    for first, left, level in _left(bench, stretch) if stretch.rests.size else []:
         last = float(result[1, left - 1 : left + 1].mean())
         # nobody knows how long the first rest lasts; and a stem may creep with p2
         if first and abs(last - result[1, first]) > 2.0 * near:
-            found.append((stretch.time[left] - stretch.time[first], abs(last - level)))
-    return np.array(found).reshape(-1, 2)
+            found.append((time[left] - time[first], last - level, time[left] - time[0]))
+    return np.array(found).reshape(-1, 3)
 
 
 def mixed_arrivals(bench: Bench, results: Sequence[Array]) -> bool:

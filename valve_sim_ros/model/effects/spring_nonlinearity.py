@@ -65,6 +65,7 @@ EFFECT = Effect(
     twins={
         'spring_preload': 'a bend needs the whole stroke: use all of it',
         'spring_rate': 'a bend needs the whole stroke: use all of it',
+        'sensor_calibration': 'an error of the sensor is a straight line: use the whole stroke',
         'ip_nonlinearity': 'with p1 and p2 unmeasured both bend the line u-x: record p2',
     },
 )
