@@ -18,7 +18,7 @@ from .unknowns import BLEND, EARLY, LATE, LEAD, PHASE, Unknown
 
 FEW_STARTS = 3
 """So many starts are followed."""
-SWEPT, FOLLOWED, GENERATIONS, FINENESS, SCATTERS = 4, 4, 30, 15, 8
+SWEPT, FOLLOWED, GENERATIONS, FINENESS, SCATTERS = 4, 4, 30, 16, 8
 """So many base valves are tried with stems of all kinds; so many are followed by an evolution
 where costs are rugged, and for how long; the binary logarithm of how many are scattered around
 the best, and how many of them are followed."""

@@ -28,7 +28,7 @@ hangs on every step [steps of unknowns]."""
 REFINING = NARROW, FINE, 0.3, 0.1
 """The same for evolutions in turn that refine a valve: slips leave valleys of any width."""
 POPULATION = 14
-FAINT, NEAR = 0.02, 1.0
+FAINT, NEAR = 0.02, 2.0
 """Excess up to which a train of slips is right (laborious effects leave more in a base valve), and
 up to which a valve is refined again and again, with fine steps as well."""
 GENERATIONS, PATIENT, MOST_TURNS, ENDS = 40, 150, 3, 0.99
