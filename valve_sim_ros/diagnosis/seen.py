@@ -192,7 +192,7 @@ def stops_seen(bench: Bench, results: Sequence[Array]) -> list[dict[str, float]]
     """
     pairs = zip(bench.stretches, results, strict=True)
     each = [(s.rests, result[1] - s.rests) for s, result in pairs if s.rests.size]
-    rests, force = (np.concatenate([*some, np.empty(0)]) for some in zip(*each, strict=True))
+    rests, force = np.concatenate([*each, np.empty((2, 0))], axis=1)
     known = np.isfinite(rests) & np.isfinite(force)
     rests, force = rests[known], force[known]
     if rests.size < LEAST_RESTS:
