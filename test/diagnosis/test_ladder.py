@@ -23,10 +23,10 @@ from valve_sim_ros.diagnosis.ladder import (
     concluded,
     excused,
     Ladder,
-    reconsidered,
 )
 from valve_sim_ros.diagnosis.odds import blurred, explained, imitates, strong, suspicious
 from valve_sim_ros.diagnosis.race import race
+from valve_sim_ros.diagnosis.reconsidering import reconsidered
 from valve_sim_ros.diagnosis.rung import judged, Rung
 from valve_sim_ros.diagnosis.stages import groups
 from valve_sim_ros.recordings.recording import Recording

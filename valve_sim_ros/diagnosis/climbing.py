@@ -187,16 +187,19 @@ def _best_drive(
     held = (HELD,) if 'x' in fitter.bench.signals else ()
     drives = [(*modelled, *held)]
     if any(ladder.rungs for ladder in ladders):
-        inexact = [each.group.signal for each in ladders if each.after.excess > odds.SPOTLESS]
+        left = {ladder.group.signal: ladder.after.excess for ladder in ladders}
+        inexact = [n for n in left if left[n] > odds.SPOTLESS and n not in modelled]
         for signals in ((), tuple(inexact)):
             drives += [(*modelled, *signals, *held), (*modelled, *signals)]
-    drives = list(dict.fromkeys(drives))
-    best, least = drives[0], math.inf
-    for drive in drives if len(drives) > 1 else ():
+    first, *others = dict.fromkeys(drives)
+    if not others:
+        return first
+    best, least = first, math.inf
+    for drive in (first, *others):
         found = find_base(fitter, group, valve, drive, roughly=True)
-        left = leftover(fitter.residuals(found, group.signal, drive)).excess
-        if left < least:
-            best, least = drive, left
+        excess = leftover(fitter.residuals(found, group.signal, drive)).excess
+        if excess < least:
+            best, least = drive, excess
         if least <= odds.SPOTLESS:
             break
     return best

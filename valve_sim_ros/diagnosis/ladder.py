@@ -15,15 +15,13 @@ from .base_valve import ahead_on_ramps, find_base, on_other_side, on_time
 from .fitting import by_cost, Fitter, Valve
 from .loosening import loosened
 from .race import race, rebased
+from .reconsidering import reconsidered
 from .rung import judged, Rung
 from .stages import Candidate, Group
 from .stretch import HELD, PUT_TO_REST
 
 MOST_EFFECTS = 2
 """Most effects named in one group of stages."""
-
-RECONSIDERED = 5
-"""So many rivals of the first effect are tried again beside the second."""
 
 Outcome = Literal['adequate', 'missing_effect', 'unknown_effect']
 
@@ -199,7 +197,8 @@ def climb(
                 rungs[-1] = replace(rung, after=rest, closed=rung.before.closed_by(rest))
                 break
             others = [each for each in candidates if each.effect != rung.effect]
-            candidates = [each for each in others if not (again and _laborious(each.effect))]
+            quick = [each for each in others if not CATALOGUE[each.effect].laborious]
+            candidates = quick if again else others
         progress(1.0)
         complete = True
     after = before if rungs else leftover(fitter.residuals(now, group.signal))
@@ -229,6 +228,8 @@ def _with_its_own_stem(fitter: Fitter, group: Group, rung: Rung) -> Rung:
 
     As measured nobody knows the stem between its samples.
     """
+    if HELD not in fitter.drive:
+        return rung
     drive = tuple(each for each in fitter.drive if each != HELD)
     after = leftover(fitter.residuals(rung.valve, group.signal, drive))
     if after.excess >= rung.after.excess:
@@ -250,73 +251,9 @@ def _keeps_to_steps(fitter: Fitter, group: Group, valve: Valve) -> bool:
 
 def _imitated(effect: str, base: Valve) -> bool:
     """Tell whether to look for an effect where a base valve leaves nothing but noise."""
-    if _laborious(effect):
+    if CATALOGUE[effect].laborious:
         return odds.imitates(base, effect)
     return CATALOGUE[effect].imitated != ''
-
-
-def _laborious(effect: str) -> bool:
-    """Tell whether runs with an effect take many times as long."""
-    return CATALOGUE[effect].laborious
-
-
-def reconsidered(
-    fitter: Fitter, group: Group, base: Valve, rungs: Sequence[Rung], *, lightly: bool = False
-) -> list[Rung]:
-    """Return the rungs with the first name chosen anew beside the second, or one if that does.
-
-    Alone, an effect may have been named because it made up for part of another one. `lightly`
-    leaves out laborious effects but the first.
-    """
-    first, second = rungs[0], rungs[1]
-    added = second.valve.candidates[-1]
-    near = sorted(first.gains, key=lambda name: -first.gains[name])[:RECONSIDERED]
-    names = {first.effect, *(name for name in near if not (lightly and _laborious(name)))}
-    others = group.candidates({*base.effects, second.effect})
-    candidates = [each for each in others if each.effect in names]
-
-    def alone(both: Valve, one: Candidate, other: Candidate) -> Valve:
-        """Return the valve with only one of two effects."""
-        valve = replace(
-            both,
-            values={**both.values, **other.neutral},
-            effects=tuple(name for name in both.effects if name != other.effect),
-            candidates=(*base.candidates, one),
-        )
-        return fitter.fit(valve, fitter.problem(group, valve))
-
-    def enough(both: Rung, only: Valve) -> list[Rung]:
-        """Return the step to one effect if two are hardly better."""
-        if 0.5 * (only.cost - both.valve.cost) / both.after.inflation >= odds.ENOUGH:
-            return []
-        runners = sorted((only, first.valve), key=by_cost)
-        found = judged(fitter, group, base, first.before, runners)
-        return [found] if found else []
-
-    earlier = alone(second.valve, first.valve.candidates[-1], added)
-    if only := enough(second, earlier):
-        return only
-    later = alone(second.valve, added, first.valve.candidates[-1])
-    if not _laborious(second.effect):  # the first may have led it into another valley
-        later = min(later, *race(fitter, group, base, [added])[:1], key=by_cost)
-    if only := enough(second, later):
-        return only
-    runners = race(fitter, group, later, candidates)
-    later = rebased(fitter, group, later, runners[:5])
-    if only := enough(second, later):
-        return only
-    before = leftover(fitter.residuals(later, group.signal))
-    found = judged(fitter, group, later, before, runners)
-    if found is None:
-        return list(rungs)
-    worse = 0.5 * (found.valve.cost - second.valve.cost) / found.after.inflation
-    if worse > odds.twin_limit(found.gains[found.effect]):
-        return list(rungs)
-    if found.effect == first.effect and worse > 0.0:
-        found = replace(found, valve=second.valve, after=second.after)
-    elif only := enough(found, alone(found.valve, found.valve.candidates[-1], added)):
-        return only
-    return [found, replace(second, after=found.after, valve=found.valve)]
 
 
 def _within(progress: Callable[[float], object], step: int) -> Callable[[float], object]:
