@@ -25,6 +25,14 @@ def written(path, u, lost, rng):
     return path
 
 
+def without_rows(path, lost):
+    """Leave out the rows of a record that are lost."""
+    header, *lines = path.read_text().splitlines()
+    kept = [line for line, gone in zip(lines, lost, strict=True) if not gone]
+    path.write_text('\n'.join([header, *kept]) + '\n')
+    return path
+
+
 def test_lost_commands_of_one_that_creeps_lie_on_a_line_and_steps_are_unsure():
     u = np.array([0.0, 1.0, 2.0, 2.0, 4.0, 5.0, 5.0, 5.0, 5.0, 40.0, 40.0, 40.0, 40.0])
     sent, unsure = bridged(u, np.array([3, 8, 11]))
@@ -51,6 +59,36 @@ def test_a_clean_record_that_lost_commands_is_adequate(tmp_path, ramp):
     if not ramp:
         put = np.abs(stretch.u - u)[lost & ~known] < 1e-5
         assert put.mean() > 0.8
+
+
+def test_a_clean_record_that_lost_whole_rows_is_adequate(tmp_path):
+    rng = np.random.default_rng(9)
+    u = np.repeat(rng.uniform(10.0, 90.0, 40), 60)
+    lost = rng.random(u.size) < 0.02
+    lost[60:1200:120] = True
+    lost[[0, -1]] = False
+    path = without_rows(written(tmp_path / 'holes.csv', u, np.zeros(u.size), rng), lost)
+    recording = read_recording(path)
+    assert recording.quality.lost_commands == tuple(np.flatnonzero(lost))
+    np.testing.assert_allclose(recording.time, 0.2 * np.arange(u.size), atol=1e-9)
+    assert np.isnan(recording.x[lost]).all()
+    assert not np.isnan(recording.x[~lost]).any()
+    found = diagnose(recording)
+    assert found.verdict == 'adequate'
+    assert found.gaps['p2'].before.held_out < 0.16
+    (stretch,) = found.bench.stretches
+    steps = lost & (np.diff(u, prepend=u[0]) != 0.0)
+    assert np.mean(np.abs(stretch.u - u)[steps] < 1e-5) > 0.8
+
+
+def test_rows_of_no_grid_and_behind_gaps_are_not_filled_in(tmp_path):
+    path = tmp_path / 'times.csv'
+    for times, count in (
+        ([0, 1, 2, 4, 5, 6, 7, 8, 9, 20, 21], 12),
+        ([0, 1, 2.4, 3, 4.6, 6, 7.5], 7),
+    ):
+        path.write_text('t,u,x\n' + ''.join(f'{time},5,1\n' for time in times))
+        assert len(read_recording(path)) == count
 
 
 def test_a_first_command_that_was_lost_is_refused(tmp_path):

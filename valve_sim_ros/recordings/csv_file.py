@@ -12,19 +12,23 @@ from typing import Any
 import numpy as np
 
 from .errors import RecordingError
-from .quality import Array
+from .quality import Array, MAX_GAP_PERIODS
 from .recording import Provenance, Recording, refuse_not_finite, SIGNALS
 from .topics import chosen, Topics
 
 TIMES = ('t', 'time', '__time')
 """What the column of times may be called: by `write_csv`, by hand, by PlotJuggler."""
+NEAR, REGULAR = 0.25, 0.9
+"""Steps of the time axis no further than this from a whole number of periods are on a grid; rows
+that are not there are lost ones where so many are."""
 
 
 def read_csv(path: str | os.PathLike[str], topics: Topics | None = None) -> Recording:
     """Read a CSV file with columns t [s], u and any of p1, p2, x [% of span], in any order.
 
-    The times may also stand in a column `time` or `__time`. An empty cell is a lost sample; the
-    command before a lost one holds. `topics` renames columns.
+    The times may also stand in a column `time` or `__time`. An empty cell is a lost sample, and so
+    is every cell of a row that is missing where the others are a period apart; the command before
+    a lost one holds. `topics` renames columns.
 
     Raises
     ------
@@ -57,11 +61,13 @@ def read_csv(path: str | os.PathLike[str], topics: Topics | None = None) -> Reco
             lost = np.isnan(values) & _empty(rows, header, columns[name][0])
             if name == 'u':
                 lost[0] = False  # nothing is known to hold there
-                lost_commands = tuple(np.flatnonzero(lost).tolist())
             refuse_not_finite(name, np.where(lost, 0.0, values), time)
-        held = np.arange(time.size)
-        held[list(lost_commands)] = 0
-        signals['u'] = signals['u'][np.maximum.accumulate(held)]
+        time, at = _with_lost_rows(time)
+        signals = {name: np.where(at < 0, np.nan, values[at]) for name, values in signals.items()}
+        lost = np.isnan(signals['u'])
+        held = np.maximum.accumulate(np.where(lost, 0, np.arange(time.size)))
+        signals['u'] = signals['u'][held]
+        doubtful = np.flatnonzero(lost[:-1] & ~lost[1:] & (np.diff(signals['u']) != 0.0)) + 1
         recording = Recording(
             time=time - time[0],
             **signals,
@@ -74,7 +80,11 @@ def read_csv(path: str | os.PathLike[str], topics: Topics | None = None) -> Reco
                 comments=comments,
             ),
         )
-        quality = replace(recording.quality, lost_commands=lost_commands)
+        quality = replace(
+            recording.quality,
+            lost_commands=tuple(np.flatnonzero(lost).tolist()),
+            doubtful_commands=tuple(doubtful.tolist()),
+        )
         return replace(recording, quality=quality)
     except RecordingError as error:
         raise RecordingError(f'{path}: {error}') from None
@@ -138,6 +148,21 @@ def _table(path: Path, rows: list[tuple[int, str]], width: int) -> Array:
         except ValueError as error:
             raise RecordingError(f'{path}, line {number}: {error}; expected numbers') from None
     return table
+
+
+def _with_lost_rows(time: Array) -> tuple[Array, np.ndarray]:
+    """Return the times [s] with those of lost rows between them, and the row of each, -1: lost."""
+    steps, row = np.diff(time), np.arange(time.size)
+    if not steps.size or (steps <= 0.0).any():
+        return time, row
+    apart = steps / np.median(steps)
+    if np.mean(np.abs(apart - np.rint(apart)) <= NEAR) < REGULAR:
+        return time, row
+    ticks = np.where(apart <= MAX_GAP_PERIODS + 0.5, np.maximum(np.rint(apart), 1), 1).astype(int)
+    place = np.concatenate([[0], np.cumsum(ticks)])
+    at = np.full(place[-1] + 1, -1)
+    at[place] = row
+    return np.interp(np.arange(at.size), place, time), at
 
 
 def _empty(rows: list[tuple[int, str]], header: list[str], index: int) -> np.ndarray:
