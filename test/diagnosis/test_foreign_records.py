@@ -70,7 +70,7 @@ def test_misfit_all_over_p2_does_not_pass_for_coloured_noise():
     assert named(Recording(run.t, run.u, *noisy)) == ['nonlinear_flow']
 
 
-@pytest.mark.parametrize(('colour', 'expected'), [(0.0, []), (0.75, [])])
+@pytest.mark.parametrize(('colour', 'expected'), [(0.0, []), (0.75, []), (0.88, [])])
 def test_coloured_noise_of_p2_is_no_effect(colour, expected):
     rng = np.random.default_rng(7)
     run = simulate(staircase(rng, 60, 30), 0.2, VALVE)

@@ -26,11 +26,33 @@ from valve_sim_ros.model.effects import CATALOGUE
 from valve_sim_ros.recordings.recording import Recording
 
 
-@pytest.mark.parametrize('colour', [0.0, 0.5, 0.75])
+def seen(noise):
+    """Return noise as a multiple of what differences show of it."""
+    return noise / np.sqrt(np.mean(np.diff(noise, 2) ** 2) / 6.0)
+
+
+@pytest.mark.parametrize('colour', [0.0, 0.5, 0.75, 0.86, 0.9])
 def test_noise_of_any_colour_leaves_no_excess(colour):
     rng = np.random.default_rng(2)
     noise = lfilter([np.sqrt(1 - colour**2)], [1, -colour], rng.standard_normal(5000))
     assert leftover(noise).excess < 0.25
+    left = leftover(seen(noise))
+    assert left.excess < 0.25
+    assert left.noise == (colour > 0.0)
+
+
+@pytest.mark.parametrize('share', [0.3, 0.6, 0.9, 0.97])
+@pytest.mark.parametrize('kind', ['wander', 'decays', 'swing'])
+def test_misfit_in_white_noise_is_no_coloured_noise(kind, share):
+    rng = np.random.default_rng(4)
+    if kind == 'wander':
+        misfit = lfilter([1], [1, -0.97], rng.standard_normal(4500))
+    elif kind == 'decays':  # after steps
+        misfit = lfilter([1], [1, -0.95], (np.arange(4500) % 90 == 0) * rng.standard_normal(4500))
+    else:
+        misfit = np.sin(0.3 * np.arange(4500))
+    misfit *= np.sqrt(share / (1.0 - share)) / misfit.std()
+    assert not leftover(seen(misfit + rng.standard_normal(4500))).noise
 
 
 def test_a_misfit_in_a_tenth_of_the_time_is_an_excess():

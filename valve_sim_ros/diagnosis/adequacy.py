@@ -22,6 +22,17 @@ ONE_SLIP = 0.01
 it should be."""
 LOWEST, HIGHEST = 0.3, 8.0
 """What may be noise [that seen from sample to sample]: a swinging model leaves no quiet window."""
+COLOURS, CLIPPED = (0.4, 0.92), 4.0
+"""Correlation from sample to sample of what may be coloured noise; innovations further out than
+this are slips [standard deviations]."""
+LAGS, WHITE, SURELY = 4, 0.04, 2.5
+"""Innovations of noise are white: correlations over so many samples are no larger than this, or so
+many times their own error."""
+LONG_WINDOWS = {10: 0.2, 20: 0.3}
+"""So much more than those of white noise may means of windows of so many samples vary."""
+MISSED, LASTS, FASTER = 0.1, 0.7, 5.0
+"""Excess that windows see in noise of such colours, at most, and how much more per correlation
+beyond LASTS: such noise lasts as long as they do."""
 
 
 class Leftover(NamedTuple):
@@ -29,7 +40,8 @@ class Leftover(NamedTuple):
 
     mean_square of the whole, single errors beyond LARGE growing linearly; the same with those
     cut off at LARGE; that of the noise alone, the number of samples that count, how many of them
-    make one independent value (coloured noise), and how many are beyond FAR times the noise.
+    make one independent value (coloured noise), how many are beyond FAR times the noise, and
+    whether all of it is coloured noise.
     """
 
     mean_square: float
@@ -38,15 +50,21 @@ class Leftover(NamedTuple):
     samples: int
     inflation: float
     far: int = 0
+    noise: bool = False
 
     @property
     def excess(self) -> float:
         """Mean square beyond the noise, over the noise."""
         return max(self.cut / self.floor - 1.0, 0.0)
 
+    @property
+    def worth(self) -> float:
+        """What of a cost one independent value makes up."""
+        return self.inflation * (self.floor if self.noise else 1.0)
+
     def closed_by(self, after: 'Leftover') -> float:
         """Part of what is beyond the noise that `after` leaves no more, 0 to 1."""
-        floor = min(self.floor, after.floor)
+        floor = after.floor if after.noise else min(self.floor, after.floor)
         missing = max(self.mean_square - floor, 1e-9)
         return min(max(1.0 - (after.mean_square - floor) / missing, 0.0), 1.0)
 
@@ -67,13 +85,24 @@ def leftover(residual: Array) -> Leftover:
     sizes = np.abs(values)
     cut = np.minimum(sizes, LARGE)
     floor = min(max(floor * inflation**0.5, LOWEST), HIGHEST)
+    square = float(np.mean(cut**2))
+    noise = _coloured_noise(residual) if inflation > 1.0 else None
+    coloured = False
+    if noise:
+        variance, correlation = noise
+        missed = MISSED + FASTER * max(correlation - LASTS, 0.0)
+        coloured = square <= (1.0 + missed) * floor
+    if coloured:
+        floor = max(floor, variance)
+        inflation = max(inflation, (1.0 + correlation) / (1.0 - correlation))
     return Leftover(
         float(np.mean(cut * (2.0 * sizes - cut))),
-        float(np.mean(cut**2)),
+        square,
         floor,
         values.size,
         inflation,
         int(np.sum(sizes > FAR * floor**0.5)),
+        coloured,
     )
 
 
@@ -87,6 +116,34 @@ def but_one_slip(residual: Array) -> Array:
     rest = residual.copy()
     rest[max(far[worst] - 1, 0) : ends[worst]] = np.nan
     return rest
+
+
+def _coloured_noise(residual: Array) -> tuple[float, float] | None:
+    """Return variance and correlation of AR(1) noise if a residual is nothing else, else None.
+
+    Windows see too little of noise that lasts as long as they do. What is left of it once each
+    value is foretold from the one before is white, unlike what misfit in white noise leaves then.
+    """
+    values = np.where(residual != 0.0, residual, np.nan)
+    limit = CLIPPED * float(np.nanmedian(np.abs(values))) / 0.6745
+    values = np.clip(values, -limit, limit)
+    pairs = np.isfinite(values[:-1] * values[1:])
+    first, second = values[:-1][pairs], values[1:][pairs]
+    correlation = float(first @ second) / max(float(first @ first), 1e-12)
+    if not COLOURS[0] <= correlation <= COLOURS[1]:
+        return None
+    innovations = values[1:] - correlation * values[:-1]
+    known = innovations[pairs]
+    variance = float(np.mean(known**2))
+    tolerance = max(WHITE, SURELY / known.size**0.5)
+    for lag in range(1, LAGS + 1):
+        if abs(float(np.nanmean(innovations[lag:] * innovations[:-lag]))) > tolerance * variance:
+            return None
+    for width, more in LONG_WINDOWS.items():
+        means = known[: known.size // width * width].reshape(-1, width).mean(axis=1)
+        if float(np.mean(means**2)) * width > (1.0 + more) * variance:
+            return None
+    return variance / (1.0 - correlation**2), correlation
 
 
 def _inflation(windows: Array) -> float:

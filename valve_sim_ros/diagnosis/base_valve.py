@@ -154,8 +154,8 @@ def _with_nuisance(fitter: Fitter, valve: Valve, nuisance: Unknown, problem: Pro
     starts = [{**valve.values, nuisance.name: share} for share in SHARES]
     found = [fitter.fit(each, problem) for each in fitter.scan(valve, starts, problem, 2)]
     better = min(found, key=by_cost)
-    inflation = leftover(fitter.residuals(better, *problem[1:])).inflation
-    clearly = 0.5 * (valve.cost - better.cost) / inflation >= odds.TWIN_GAIN
+    worth = leftover(fitter.residuals(better, *problem[1:])).worth
+    clearly = 0.5 * (valve.cost - better.cost) / worth >= odds.TWIN_GAIN
     return better if clearly else valve
 
 

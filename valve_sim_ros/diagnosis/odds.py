@@ -97,18 +97,19 @@ def suspicious(left: Leftover, group: Group, mixed: bool) -> bool:
 def coloured(group: Group, left: Leftover) -> bool:
     """Tell whether what looks like coloured noise of a pressure may as well be misfit all over."""
     seems = left.mean_square > COLOURED and left.inflation > COLOUR and left.excess < SPOTLESS
-    return seems and not group.has_stem
+    return seems and not (group.has_stem or left.noise)
 
 
-def gain(before: float, after: Valve, inflation: float, count: int) -> float:
+def gain(before: float, after: Valve, left: Leftover) -> float:
     """Return what one more effect brings: likelihood of independent samples less BIC.
 
-    A candidate that was looked for in many places pays for each of them.
+    A candidate that was looked for in many places pays for each of them. `left` is what the best
+    valve leaves.
     """
     candidate = after.candidates[-1]
-    independent = max(count / inflation, 10.0)
+    independent = max(left.samples / left.inflation, 10.0)
     penalty = 0.5 * len(candidate.names) * math.log(independent) + math.log(candidate.places)
-    return 0.5 * (before - after.cost) / inflation - penalty
+    return 0.5 * (before - after.cost) / left.worth - penalty
 
 
 def choice(runners: Sequence[Valve], gains: Mapping[str, float]) -> Valve:

@@ -44,7 +44,7 @@ def reconsidered(
 
     def enough(both: Rung, only: Valve) -> list[Rung]:
         """Return the step to one effect if two are hardly better."""
-        if 0.5 * (only.cost - both.valve.cost) / both.after.inflation >= odds.ENOUGH:
+        if 0.5 * (only.cost - both.valve.cost) / both.after.worth >= odds.ENOUGH:
             return []
         runners = sorted((only, first.valve), key=by_cost)
         found = judged(fitter, group, base, first.before, runners)
@@ -66,7 +66,7 @@ def reconsidered(
     found = judged(fitter, group, later, before, runners)
     if found is None:
         return list(rungs)
-    worse = 0.5 * (found.valve.cost - second.valve.cost) / found.after.inflation
+    worse = 0.5 * (found.valve.cost - second.valve.cost) / found.after.worth
     if worse > odds.twin_limit(found.gains[found.effect]):
         return list(rungs)
     if found.effect == first.effect and worse > 0.0:

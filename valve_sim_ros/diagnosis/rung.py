@@ -58,11 +58,8 @@ def judged(
     if not runners:
         return None
     best_after = leftover(fitter.residuals(runners[0], group.signal))
-    inflation, count = best_after.inflation, best_after.samples
     tops = odds.best_per_effect(runners)
-    gains = {
-        each.candidates[-1].effect: odds.gain(now.cost, each, inflation, count) for each in tops
-    }
+    gains = {each.candidates[-1].effect: odds.gain(now.cost, each, best_after) for each in tops}
     best = odds.choice(tops, gains)
     candidate = best.candidates[-1]
     after = leftover(fitter.residuals(best, group.signal))

@@ -42,6 +42,25 @@ class Slip(NamedTuple):
     d2: float
 
 
+class Parts(NamedTuple):
+    """Parts of a slip's speed along its direction [%/s]: free motion, and what the pressure does.
+
+    The free motion is `one` + `two` if overdamped; else it is `one`, which `two` turns into.
+    """
+
+    one: float
+    two: float
+    push: float
+
+
+class Gains(NamedTuple):
+    """How the parts of a speed change over some time: `free_motion`, and the chamber's decay."""
+
+    one: float
+    two: float
+    push: float
+
+
 @njit
 def stem_poles(a_1: float, a_2: float) -> Poles:
     """Return the poles of s^2 + a_2 s + a_1, written so that nothing cancels."""
@@ -103,15 +122,52 @@ def slip_acceleration(slip: Slip, decay: float, phi1: float, phi2: float, poles:
     return bend + slip.rate * slip.rate * slip.forced * decay
 
 
-@njit
-def speed_and_acceleration(tau: float, slip: Slip, poles: Poles) -> tuple[float, float]:
-    """Return the stem's speed [%/s] and acceleration [%/s^2] at `tau` seconds into the slip."""
-    phi1, phi2 = free_motion(tau, poles)
-    decay = math.exp(-slip.rate * tau)
-    return (
-        slip_speed(slip, decay, phi1, phi2),
-        slip_acceleration(slip, decay, phi1, phi2, poles),
-    )
+@njit(forceinline=True)
+def parts_at_start(slip: Slip, direction: float) -> Parts:
+    """Return the parts of a slip's speed when it begins."""
+    return Parts(direction * slip.d1, direction * slip.d2, -direction * slip.rate * slip.forced)
+
+
+@njit(forceinline=True)
+def gains_over(tau: float, rate: float, poles: Poles) -> Gains:
+    """Return how the parts of a speed change over `tau` seconds."""
+    one, two = free_motion(tau, poles)
+    return Gains(one, two, math.exp(-rate * tau))
+
+
+@njit(forceinline=True)
+def after(parts: Parts, gains: Gains, regime: int) -> Parts:
+    """Return the parts of a speed after the time over which the gains are."""
+    one, two, push = parts
+    if regime == OVERDAMPED:
+        return Parts(one * gains.one, two * gains.two, push * gains.push)
+    turned = gains.two * one if regime == UNDERDAMPED else 0.0
+    return Parts(gains.one * one + gains.two * two, gains.one * two - turned, push * gains.push)
+
+
+@njit(forceinline=True)
+def over_twice(gains: Gains, regime: int) -> Gains:
+    """Return the gains over a time twice as long."""
+    one, two = gains.one, gains.two
+    push = gains.push * gains.push
+    if regime == OVERDAMPED:
+        return Gains(one * one, two * two, push)
+    turned = two * two if regime == UNDERDAMPED else 0.0
+    return Gains(one * one - turned, 2.0 * one * two, push)
+
+
+@njit(forceinline=True)
+def speed_of(parts: Parts, regime: int) -> float:
+    """Return the speed along the direction of the slip [%/s]."""
+    free = parts.one + parts.two if regime == OVERDAMPED else parts.one
+    return free + parts.push
+
+
+@njit(forceinline=True)
+def slope_of(parts: Parts, rate: float, poles: Poles) -> float:
+    """Return how fast that speed grows [%/s^2]."""
+    two = parts.two if poles.regime == CRITICAL else poles.second * parts.two
+    return poles.first * parts.one + two - rate * parts.push
 
 
 @njit(forceinline=True)
@@ -127,24 +183,15 @@ def lowest(
 
 
 @njit(forceinline=True)
-def stops_once(
-    slip: Slip,
-    direction: float,
-    delta: float,
-    decay: float,
-    phi1: float,
-    phi2: float,
-    poles: Poles,
-) -> bool:
+def stops_once(parts: Parts, delta: float, rate: float, poles: Poles) -> bool:
     """Tell whether an overdamped slip, faster than delta now, surely falls below it only once.
 
     A sum of exponentials has no more zeros than its partial sums, from the slowest one on, change
-    their sign (Laguerre). `decay`, `phi1` and `phi2` are those of now.
+    their sign (Laguerre).
     """
-    one, two = direction * slip.d1 * phi1, direction * slip.d2 * phi2
-    push = -direction * slip.rate * slip.forced * decay
-    slowest = push if slip.rate < -poles.first else one
-    quickest = push if slip.rate > -poles.second else two
+    one, two, push = parts
+    slowest = push if rate < -poles.first else one
+    quickest = push if rate > -poles.second else two
     return slowest <= delta or one + two + push - quickest >= delta
 
 
@@ -166,7 +213,7 @@ def surely_moving(
     if direction * slip_speed(slip, decay, phi1, phi2) <= delta:
         return False
     if poles.regime == OVERDAMPED:
-        return stops_once(slip, direction, delta, 1.0, 1.0, 1.0, poles)
+        return stops_once(parts_at_start(slip, direction), delta, slip.rate, poles)
     quickest = max(1.0 / (EIGHTH * poles.scale), -poles.first, slip.rate)
     if poles.regime == UNDERDAMPED and quickest * duration <= 1.0:
         first = direction * slip_speed(slip, 1.0, 1.0, 0.0)
@@ -189,79 +236,97 @@ def first_stop(
 
     The speed is a sum of at most four exponentials, each of which acts about its own time
     constant, or a decaying oscillation: a scan with steps that grow with the time since the start,
-    or of an eighth of a period, brackets the first zero, or shows a dip that may reach it. No scan
-    is needed where there is but one.
+    or of an eighth of a period, brackets the first zero, or shows a dip that may reach it. From
+    step to step the speed takes no exponential.
     """
+    regime, rate = poles.regime, slip.rate
     longest, quickest = math.inf, poles.second
-    if poles.regime == UNDERDAMPED:
+    if regime == UNDERDAMPED:
         longest, quickest = EIGHTH * poles.scale, poles.first
-    step = 0.25 / max(-quickest, slip.rate)
-    start = 0.0
-    bend = speed_and_acceleration(start, slip, poles)[1]
+    step = min(0.25 / max(-quickest, rate), longest)
+    gains = gains_over(step, rate, poles)
+    now = parts_at_start(slip, direction)
+    start, bend = 0.0, slope_of(now, rate, poles)
     once = False
+    grows = False  # every other step is twice as long
     while start < left:
-        if armed and not once and poles.regime == OVERDAMPED:
-            one, two = free_motion(start, poles)
-            fall = math.exp(-slip.rate * start)
-            once = stops_once(slip, direction, delta, fall, one, two, poles)
-        end = left if once else min(start + min(step, longest), left)
-        speed, slope = speed_and_acceleration(end, slip, poles)
+        if armed and not once and regime == OVERDAMPED:
+            once = stops_once(now, delta, rate, poles)
+            if once:
+                last = after(now, gains_over(left - start, rate, poles), regime)
+                if speed_of(last, regime) > delta:
+                    return -1.0, armed
+        end = start + step
+        if end < left:
+            then = after(now, gains, regime)
+        else:
+            end = left
+            then = after(now, gains_over(left - start, rate, poles), regime)
+        speed, slope = speed_of(then, regime), slope_of(then, rate, poles)
         level = delta if armed else -BACKWARD
-        if direction * speed < level or (armed and direction * speed == level):
-            return stop_between(start, end, slip, direction, level, poles), armed
-        if not once and direction * bend < 0.0 < direction * slope:
-            low = dip(start, end, slip, direction, level, poles)
+        if speed < level or (armed and speed == level):
+            return start + stop_within(end - start, now, then, level, rate, poles), armed
+        if not once and bend < 0.0 < slope:
+            low = dip(end - start, now, then, level, rate, poles)
             if low >= 0.0:
-                return stop_between(start, low, slip, direction, level, poles), armed
-        armed = armed or direction * speed > delta
-        start, bend = end, slope
-        step *= 1.5
+                there = after(now, gains_over(low, rate, poles), regime)
+                return start + stop_within(low, now, there, level, rate, poles), armed
+        armed = armed or speed > delta
+        start, now, bend = end, then, slope
+        if grows and 2.0 * step <= longest:
+            step, gains = 2.0 * step, over_twice(gains, regime)
+        grows = not grows
     return -1.0, armed
 
 
 @njit
 def dip(
-    start: float, end: float, slip: Slip, direction: float, level: float, poles: Poles
+    duration: float, parts: Parts, last: Parts, level: float, rate: float, poles: Poles
 ) -> float:
-    """Return when a speed that falls at first and rises at last is below `level`, or -1."""
-    first, slope_first = speed_and_acceleration(start, slip, poles)
-    last, slope_last = speed_and_acceleration(end, slip, poles)
+    """Return when a speed that falls at first and rises at last is below `level`, or -1.
+
+    `parts` are those at first, `last` those after `duration` seconds.
+    """
+    start, end = 0.0, duration
+    first, slope_first = speed_of(parts, poles.regime), slope_of(parts, rate, poles)
+    final, slope_final = speed_of(last, poles.regime), slope_of(last, rate, poles)
     for _ in range(30):
-        when, low = lowest(
-            end - start,
-            direction * first,
-            direction * slope_first,
-            direction * last,
-            direction * slope_last,
-        )
+        when, low = lowest(end - start, first, slope_first, final, slope_final)
         when += start
         if low > level or not start < when < end:
             return -1.0
-        speed, slope = speed_and_acceleration(when, slip, poles)
-        if direction * speed < level:
+        there = after(parts, gains_over(when, rate, poles), poles.regime)
+        speed, slope = speed_of(there, poles.regime), slope_of(there, rate, poles)
+        if speed < level:
             return when
-        if direction * slope < 0.0:
+        if slope < 0.0:
             start, first, slope_first = when, speed, slope
         else:
-            end, last, slope_last = when, speed, slope
+            end, final, slope_final = when, speed, slope
     return -1.0
 
 
 @njit
-def stop_between(
-    start: float, end: float, slip: Slip, direction: float, level: float, poles: Poles
+def stop_within(
+    duration: float, parts: Parts, last: Parts, level: float, rate: float, poles: Poles
 ) -> float:
-    """Return when the speed falls to `level` between two times: Newton, kept in its bracket."""
-    tolerance = 1e-9 * end  # a step of Newton squares what is left
-    tau = 0.5 * (start + end)
+    """Return when the speed falls to `level` within `duration`: Newton, kept in its bracket.
+
+    `parts` are those at first, `last` those at last. Newton begins where a straight line between
+    their speeds is at `level`.
+    """
+    start, end = 0.0, duration
+    tolerance = 1e-9 * duration  # a step of Newton squares what is left
+    above = speed_of(parts, poles.regime) - level
+    below = level - speed_of(last, poles.regime)
+    tau = duration * above / (above + below) if above > 0.0 else 0.5 * duration
     for _ in range(60):
-        speed, acceleration = speed_and_acceleration(tau, slip, poles)
-        above = direction * speed - level
+        there = after(parts, gains_over(tau, rate, poles), poles.regime)
+        above, slope = speed_of(there, poles.regime) - level, slope_of(there, rate, poles)
         if above > 0.0:
             start = tau
         else:
             end = tau
-        slope = direction * acceleration
         guess = tau - above / slope if slope < 0.0 else math.inf
         if abs(guess - tau) <= tolerance:
             return guess

@@ -146,7 +146,7 @@ def through_events(
             fall = math.exp(-slip.rate * stop)
             one, two = free_motion(stop, poles)
             stem = Stem(slip_position(slip, fall, one, two), 0.0, 0.0, False)
-            excess *= math.exp(-rate * stop)
+            excess *= fall
             left -= stop
             if left <= 0.0:
                 return stem
