@@ -83,10 +83,11 @@ def test_coloured_noise_of_p2_is_no_effect(colour, expected):
     assert named(Recording(run.t, run.u, *noisy)) == expected
 
 
-def test_steps_of_a_sensor_show_under_noise_that_comes_after_them():
+@pytest.mark.parametrize('offset', [0.0, 0.5])
+def test_steps_of_a_sensor_show_under_noise_that_comes_after_them(offset):
     rng = np.random.default_rng(8)
     run = simulate(staircase(rng, 60, 12), 1.0, VALVE)
-    x = 3.1 * np.rint(run.x / 3.1)
+    x = 3.1 * np.rint((run.x - offset) / 3.1) + offset
     noisy = [each + 0.2 * rng.standard_normal(run.t.size) for each in (run.p1, run.p2, x)]
     assert named(Recording(run.t, run.u, *noisy)) == ['sensor_quantisation']
 

@@ -20,14 +20,14 @@ from .errors import DiagnosisError
 from .readings import (
     between_lines,
     bridged,
-    coarse_step,
+    coarse_grid,
     filled,
     foreseen,
+    grids_kept,
     resolution_of,
     REST,
     slope_of,
     smooth,
-    steps_kept,
     still,
     straightened,
     wild,
@@ -269,21 +269,21 @@ class Bench:
 
     def forgive_steps(self) -> None:
         """Count the steps of x as noise, the quiet windows between two of them as well."""
-        steps = self.step_of_x / math.sqrt(12.0 * LOWEST)
+        steps = self.grid_of_x[0] / math.sqrt(12.0 * LOWEST)
         self.noise['x'] = max(self.noise['x'], steps)
         for stretch in self.stretches:
             stretch.noise['x'] = self._uncertainty('x', stretch.measured['x'])
             stretch.recount(stretch.counts)
 
     @cached_property
-    def step_of_x(self) -> float:
-        """Step on whose multiples all x lie [% of span]; mostly 0."""
-        return coarse_step(self._all_x(), self.steps_of_x)
+    def grid_of_x(self) -> tuple[float, float]:
+        """Step and offset of a grid on which all x lie [% of span]; mostly 0."""
+        return coarse_grid(self._all_x(), self.grids_of_x)
 
     @cached_property
-    def steps_of_x(self) -> tuple[float, ...]:
-        """Steps to whose multiples x keeps, the coarsest first [% of span]; mostly none."""
-        return steps_kept(self._all_x(), self.noise.get('x', 0.0))
+    def grids_of_x(self) -> tuple[tuple[float, float], ...]:
+        """Steps and offsets of grids to which x keeps, the coarsest first [%]; mostly none."""
+        return grids_kept(self._all_x(), self.noise.get('x', 0.0))
 
     def _all_x(self) -> Array:
         """Return all measured x, none if x is not measured."""

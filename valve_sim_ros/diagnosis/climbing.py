@@ -90,7 +90,9 @@ def climb_all(
                 progress=_within(tell, share + width, 0.0, f'{text} again'),
                 stops=stops,
             )
-            if fitter.bench.step_of_x and any(each.effect == odds.COARSE for each in candidates):
+            if fitter.bench.grid_of_x[0] and any(
+                each.effect == odds.COARSE for each in candidates
+            ):
                 ladder = rounded(fitter, ladder, candidates, again)
             elif candidates and ladder.outcome == 'unknown_effect':
                 first, ladder = ladder, replace(ladder, complete=False)

@@ -38,7 +38,12 @@ def rounded(
         ladder = concluded(again(others))
     if ladder.outcome == 'unknown_effect':
         return ladder
-    (candidate,) = (each for each in candidates if each.effect == COARSE)
+    offset = fitter.bench.grid_of_x[1]
+    candidate = next(
+        each
+        for each in candidates
+        if each.effect == COARSE and ('offset' in each.names) == (offset != 0.0)
+    )
     rung = _read(fitter, ladder, candidate)
     return replace(
         ladder,
@@ -55,9 +60,11 @@ def _read(fitter: Fitter, ladder: Ladder, candidate: Candidate) -> Rung:
     The evidence is that all independent values lie so near to multiples of a step by chance.
     """
     group, before = ladder.group, ladder.after
+    step, offset = fitter.bench.grid_of_x
+    own = {f'{COARSE}.step': step, f'{COARSE}.offset': offset}
     valve = replace(
         ladder.valve,
-        values={**ladder.valve.values, f'{COARSE}.step': fitter.bench.step_of_x},
+        values={**ladder.valve.values, **own},
         effects=(*ladder.valve.effects, COARSE),
         candidates=(*ladder.valve.candidates, candidate),
     )

@@ -243,8 +243,15 @@ def _keeps_to_steps(fitter: Fitter, group: Group, valve: Valve) -> bool:
         return False
     rounding = replace(valve, effects=tuple(dict.fromkeys((*valve.effects, odds.COARSE))))
     each = [
-        replace(rounding, values={**valve.values, f'{odds.COARSE}.step': step})
-        for step in fitter.bench.steps_of_x
+        replace(
+            rounding,
+            values={
+                **valve.values,
+                f'{odds.COARSE}.step': step,
+                f'{odds.COARSE}.offset': offset,
+            },
+        )
+        for step, offset in fitter.bench.grids_of_x
     ]
     return any(fitter.score(one, group.signal, fitter.drive) < valve.cost for one in each)
 

@@ -82,9 +82,12 @@ def race(
         residual = fitter.residuals(valve, group.signal, (*fitter.drive, RESTS))
         seen = {
             'swings': _swings(fitter, residual),
-            'steps': fitter.bench.steps_of_x,
+            'steps': tuple(step for step, _ in fitter.bench.grids_of_x),
+            'offsets': tuple(offset for _, offset in fitter.bench.grids_of_x),
             **calibration_seen(fitter.bench, results),
         }
+        if not any(seen['offsets']):  # a grid through 0 needs none
+            candidates = [each for each in candidates if 'offset' not in each.names]
         held = friction_seen(fitter.bench, results)[0]
         frictions = friction_grid(held)
         if 'f_d1' in free and valve.values['f_d1'] > valve.values['f_s']:

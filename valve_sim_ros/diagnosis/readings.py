@@ -2,13 +2,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a measured signal shows by itself, without a model beside it."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 import math
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 import numpy.typing as npt
 from scipy.ndimage import median_filter
+from scipy.optimize import minimize_scalar
 from scipy.signal import find_peaks, periodogram
 
 from ..model.pipeline import Array
@@ -21,8 +22,9 @@ OFF, ALL, LEAST_STEP, LEAST_VALUES = 0.05, 0.99, 0.3, 4
 [%] are a usual resolution, and fewer values may be chance."""
 TINY = 1e-6
 """A finer resolution is that of the numbers [%]."""
-BIN, LONG = 0.01, 32
-"""Bins in which x is counted [%], and how much longer their spectrum is than the span."""
+BIN, LONG, WITHIN, AS_PLAIN = 0.01, 32, 0.5, 0.98
+"""Bins in which x is counted [%], how much longer their spectrum is than the span; how near to its
+peak a grid is sought [1 / range of x], and how nearly as well one through 0 must be kept."""
 REST, FEW = 5, 8
 """Samples over which two means agree while the stem rests, and too few for a slope."""
 NEAR, ALIKE = 15, 3.0
@@ -177,22 +179,47 @@ def foreseen(u: Array, p1: Array, noise: float, unsure: Rows) -> bool:
     return bool(soon.sum() >= max(LEAST_SOON, LEAST_SHARE * large.sum()))
 
 
-def steps_kept(x: Array, noise: float) -> tuple[float, ...]:
-    """Return the steps to whose multiples x keeps but for noise, the coarsest first [%]."""
+def grids_kept(x: Array, noise: float) -> tuple[tuple[float, float], ...]:
+    """Return step and offset of grids to which x keeps but for noise, the coarsest first [%]."""
     x = x[(x >= 0.0) & (x < 100.0)]
     counts = np.histogram(x, round(100.0 / BIN), (0.0, 100.0))[0]
-    # 1 where all x are multiples of one over the frequency, near 0 where they are anywhere
+    # 1 where all x are a multiple of one over the frequency apart, near 0 where they are anywhere
     length = LONG * counts.size
     frequency = np.fft.rfftfreq(length, BIN)
-    middle = np.exp(-1j * np.pi * frequency * BIN)  # of the first bin
-    kept = (np.fft.rfft(counts, length) * middle).real / max(x.size, 1)
+    kept = np.abs(np.fft.rfft(counts, length)) / max(x.size, 1)
     clear = np.maximum(np.exp(-2.0 * (np.pi * noise * frequency) ** 2), BLURRED)
     kept = np.minimum(kept / clear, 1.0)
     inside = (frequency > 1.0 / COARSEST) & (frequency < 1.0 / FINEST)
     peaks = find_peaks(np.where(inside, kept, 0.0), height=ON_STEPS)[0]
     # halves of a step are kept as well as the step
     alike = peaks[kept[peaks] >= AS_WELL * kept[peaks].max(initial=0.0)]
-    return tuple((1.0 / frequency[alike[:MOST_STEPS]]).tolist())
+    return tuple(_fitted_grid(x, rough) for rough in 1.0 / frequency[alike[:MOST_STEPS]])
+
+
+def _fitted_grid(x: Array, step: float) -> tuple[float, float]:
+    """Return step and offset of a grid as x tells: a spectrum of bins is not as sharp.
+
+    The offset is 0 where that is as good.
+    """
+
+    def kept(frequency: float) -> complex:
+        return complex(np.exp(2j * np.pi * frequency * x).mean())
+
+    def best(share: Callable[[complex], float]) -> float:
+        near = WITHIN / max(float(np.ptp(x)), step)
+        bounds = 1.0 / step - near, 1.0 / step + near
+        return float(
+            minimize_scalar(
+                lambda f: -share(kept(f)), bounds=bounds, method='bounded', options={'xatol': 1e-9}
+            ).x
+        )
+
+    plain, any_phase = best(lambda turns: turns.real), best(abs)
+    turns = kept(any_phase)
+    if kept(plain).real >= AS_PLAIN * abs(turns):
+        return 1.0 / plain, 0.0
+    step = 1.0 / any_phase
+    return step, step * (float(np.angle(turns)) / (2.0 * math.pi) % 1.0)
 
 
 def resolution_of(values: Array) -> float:
@@ -206,16 +233,12 @@ def resolution_of(values: Array) -> float:
     return step if np.abs(parts - np.rint(parts)).max() < OFF else 0.0
 
 
-def coarse_step(x: Array, rough_steps: Iterable[float]) -> float:
-    """Return the largest step on whose multiples x lies [% of span], 0 if it may be anywhere."""
-    found = 0.0
-    for rough in rough_steps:
-        step = rough
-        for _ in range(2):  # the spectrum knows it less well than its highest multiple does
-            multiples = np.round(x / step)
-            step = float(multiples @ x) / max(float(multiples @ multiples), 1.0)
-        multiples = np.round(x / step)
-        on_them = np.abs(x - step * multiples) < OFF * step
-        if on_them.mean() >= ALL and np.unique(multiples).size >= LEAST_VALUES:
-            found = max(found, step)
-    return found if found >= LEAST_STEP else 0.0
+def coarse_grid(x: Array, grids: Iterable[tuple[float, float]]) -> tuple[float, float]:
+    """Return step and offset of the coarsest grid on which x lies [%], 0 if it may be anywhere."""
+    found = 0.0, 0.0
+    for step, offset in grids:
+        lines = np.round((x - offset) / step)
+        on_them = np.abs(x - offset - step * lines) < OFF * step
+        if on_them.mean() >= ALL and np.unique(lines).size >= LEAST_VALUES:
+            found = max(found, (step, offset))
+    return found if found[0] >= LEAST_STEP else (0.0, 0.0)

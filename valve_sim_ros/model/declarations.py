@@ -112,8 +112,8 @@ class EffectParameter(Parameter):
     first step where costs are so narrow that the usual one would jump over them. `usual` is how
     far from neutral it usually lies, `positive` whether it never lies below: they decide where
     data cannot. `shown` names what of the data shows where to start, if anything does: 'swings',
-    the frequencies at which the residual swings most, 'steps', to whose multiples x keeps, or
-    'zeros' and 'spans' with which the same holds the stem everywhere.
+    the frequencies at which the residual swings most, 'steps' and 'offsets' of grids to which x
+    keeps, or 'zeros' and 'spans' with which the same holds the stem everywhere.
     """
 
     neutral: float = 0.0
@@ -122,7 +122,7 @@ class EffectParameter(Parameter):
     step: float = 0.0
     usual: tuple[float, ...] = ()
     positive: bool = False
-    shown: Literal['', 'swings', 'steps', 'zeros', 'spans'] = ''
+    shown: Literal['', 'swings', 'steps', 'offsets', 'zeros', 'spans'] = ''
 
     def __post_init__(self) -> None:
         """Refuse a neutral value that is not legal."""

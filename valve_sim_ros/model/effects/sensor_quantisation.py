@@ -12,8 +12,8 @@ from ..declarations import Effect, EffectParameter
 
 @njit
 def sensor(value: float, state: Any, p: Any, memory: Any, dt: float) -> float:
-    """Return x rounded to whole steps."""
-    return p[0] * math.floor(value / p[0] + 0.5) if p[0] > 0.0 else value
+    """Return x rounded to whole steps, of which one lies at the offset."""
+    return p[0] * math.floor((value - p[1]) / p[0] + 0.5) + p[1] if p[0] > 0.0 else value
 
 
 EFFECT = Effect(
@@ -35,7 +35,21 @@ EFFECT = Effect(
             shown='steps',
             usual=(0.4, 6.0),
         ),
+        EffectParameter(
+            'offset',
+            'o',
+            '%',
+            0.0,
+            0.0,
+            10.0,
+            'linear',
+            'A value of x at which a step lies',
+            starts=(0.0,),
+            step=0.004,
+            shown='offsets',
+        ),
     ),
+    variants=(('step',), ('step', 'offset')),
     slots={'sensor_slot': sensor},
     order=40,
     explanation='The position signal has few steps, as of a coarse converter or a limit in a bus.',
