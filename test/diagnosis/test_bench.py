@@ -169,7 +169,9 @@ def test_a_coarse_sensor_shows_its_steps(offset):
     assert seen(record.x) == ()
     assert seen(np.round(record.x, 2)) == ()  # as written down, far below the noise
     first = Bench([Recording(record.time, record.u, x=coarse)])
-    assert first.grid_of_x == pytest.approx((1.37, offset), rel=1e-4)
+    step, found = first.grid_of_x
+    assert step == pytest.approx(1.37, rel=1e-6)
+    assert found == pytest.approx(offset, abs=1e-4)
     noisy = coarse + 0.1 * np.random.default_rng(2).standard_normal(coarse.size)
     for other in (noisy, record.x, np.round(record.x, 1)):
         assert Bench([Recording(record.time, record.u, x=other)]).grid_of_x == (0.0, 0.0)
