@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 
 from valve_sim_ros import simulate
+from valve_sim_ros.diagnosis.alike import alike
 from valve_sim_ros.diagnosis.base_valve import find_base, starting_valve
 from valve_sim_ros.diagnosis.bench import Bench
 from valve_sim_ros.diagnosis.fitting import Fitter
-from valve_sim_ros.diagnosis.race import alike, race
+from valve_sim_ros.diagnosis.race import race
 from valve_sim_ros.diagnosis.stages import groups
 from valve_sim_ros.recordings.recording import Recording
 

@@ -15,6 +15,7 @@ from ..model.effects import CATALOGUE
 from ..model.pipeline import Array
 from . import odds
 from .adequacy import leftover
+from .alike import alike
 from .base_valve import find_base, with_any_stem
 from .fitting import by_cost, eased, FAINT, Fitter, LONG, Problem, SHORT, Valve
 from .seen import (
@@ -87,7 +88,7 @@ def race(
             **calibration_seen(fitter.bench, results),
         }
         if not any(seen['offsets']):  # a grid through 0 needs none
-            candidates = [each for each in candidates if 'offset' not in each.names]
+            candidates = [each for each in candidates if not _shifted(each)]
         held = friction_seen(fitter.bench, results)[0]
         frictions = friction_grid(held)
         if 'f_d1' in free and valve.values['f_d1'] > valve.values['f_s']:
@@ -180,50 +181,14 @@ def race(
     return alike(fitter, group, runners)
 
 
+def _shifted(candidate: Candidate) -> bool:
+    """Tell whether it is a coarse sensor whose grid does not go through 0."""
+    return candidate.effect == odds.COARSE and 'offset' in candidate.names
+
+
 def _slow(effect: str) -> bool:
     """Tell whether a search for an effect takes many times as long as one for another."""
     return CATALOGUE[effect].laborious or CATALOGUE[effect].rugged
-
-
-def alike(fitter: Fitter, group: Group, runners: Sequence[Valve]) -> list[Valve]:
-    """Return the runners, those that look like the best sought from its base valve as well."""
-    best = runners[0]
-    effect = best.candidates[-1].effect
-    base = {unknown.name: best.values[unknown.name] for unknown in fitter.unknowns(group)}
-
-    def sought(runner: Valve) -> Valve:
-        candidate = runner.candidates[-1]
-        if effect == candidate.effect or not odds.look_alike(effect, candidate.effect):
-            return runner
-        own = [{**base, **start} for start in ({}, *candidate.starts({}))]
-        starts = [{**runner.values, **each} for each in (*own, *_same(best, candidate, base))]
-        there = fitter.scan(runner, starts, fitter.problem(group, runner))[0]
-        return min(runner, fitter.fit(there, fitter.problem(group, there)), key=by_cost)
-
-    return sorted(map(sought, runners), key=by_cost)
-
-
-def _same(best: Valve, candidate: Candidate, base: Mapping[str, float]) -> list[dict[str, float]]:
-    """Return what one effect is as another one with parameters of the same names.
-
-    All is linear but for friction: zero and span of the converter do to x what those of the sensor
-    do if friction and the pressures at the beginning are as much greater.
-    """
-    effect = best.candidates[-1].effect
-    names = [name for name in candidate.names if name in best.candidates[-1].names]
-    if 'f_s' not in base or not names:
-        return []
-    same = {name: best.values[f'{effect}.{name}'] for name in names}
-    zero, span = same.get('zero', 0.0), same.get('span', 1.0)
-    values = {**candidate.neutral, **{f'{candidate.effect}.{n}': v for n, v in same.items()}}
-    hidden = {name: base[name] for name in base if name.startswith(('p1_0', 'p2_0'))}
-    greater = {name: zero + span * value for name, value in hidden.items()}
-    less = {name: (value - zero) / span for name, value in hidden.items()}
-    return [
-        {**base, **values},
-        {**base, **values, **greater, 'f_s': base['f_s'] * span},
-        {**base, **values, **less, 'f_s': base['f_s'] / span},
-    ]
 
 
 def in_reach(valve: Valve, runners: Sequence[Valve]) -> list[Valve]:

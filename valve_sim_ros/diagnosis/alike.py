@@ -1,0 +1,50 @@
+# Copyright 2026 The valve_sim_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Effects that look like the best of a race, sought from where that ended."""
+
+from collections.abc import Mapping, Sequence
+
+from . import odds
+from .fitting import by_cost, Fitter, Valve
+from .stages import Candidate, Group
+
+
+def alike(fitter: Fitter, group: Group, runners: Sequence[Valve]) -> list[Valve]:
+    """Return the runners, those that look like the best sought from its base valve as well."""
+    best = runners[0]
+    effect = best.candidates[-1].effect
+    base = {unknown.name: best.values[unknown.name] for unknown in fitter.unknowns(group)}
+
+    def sought(runner: Valve) -> Valve:
+        candidate = runner.candidates[-1]
+        if effect == candidate.effect or not odds.look_alike(effect, candidate.effect):
+            return runner
+        own = [{**base, **start} for start in ({}, *candidate.starts({}))]
+        starts = [{**runner.values, **each} for each in (*own, *_same(best, candidate, base))]
+        there = fitter.scan(runner, starts, fitter.problem(group, runner))[0]
+        return min(runner, fitter.fit(there, fitter.problem(group, there)), key=by_cost)
+
+    return sorted(map(sought, runners), key=by_cost)
+
+
+def _same(best: Valve, candidate: Candidate, base: Mapping[str, float]) -> list[dict[str, float]]:
+    """Return what one effect is as another one with parameters of the same names.
+
+    All is linear but for friction: zero and span of the converter do to x what those of the sensor
+    do if friction and the pressures at the beginning are as much greater.
+    """
+    effect = best.candidates[-1].effect
+    names = [name for name in candidate.names if name in best.candidates[-1].names]
+    if 'f_s' not in base or not names:
+        return []
+    same = {name: best.values[f'{effect}.{name}'] for name in names}
+    zero, span = same.get('zero', 0.0), same.get('span', 1.0)
+    values = {**candidate.neutral, **{f'{candidate.effect}.{n}': v for n, v in same.items()}}
+    hidden = {name: base[name] for name in base if name.startswith(('p1_0', 'p2_0'))}
+    greater = {name: zero + span * value for name, value in hidden.items()}
+    less = {name: (value - zero) / span for name, value in hidden.items()}
+    return [
+        {**base, **values},
+        {**base, **values, **greater, 'f_s': base['f_s'] * span},
+        {**base, **values, **less, 'f_s': base['f_s'] / span},
+    ]
