@@ -32,7 +32,7 @@ from .readings import (
     straightened,
     wild,
 )
-from .stretch import CAUGHT, Grid, HELD, ON_TIME, RESTS, Stretch
+from .stretch import CAUGHT, FINELY, Grid, HELD, MODELLED, ON_TIME, PARTS, RESTS, Stretch
 
 LEAST_PART = 20
 """A part of no more samples between two gaps tells nothing."""
@@ -68,6 +68,7 @@ class Bench:
     def __init__(self, recordings: Sequence[Recording]) -> None:
         """Cut the recordings into stretches and look at the noise; DiagnosisError if empty."""
         self.jitter = JITTER
+        self.before: tuple[str, ...] = ()
         self.signals = tuple(
             name for name in OUTPUTS if all(name in recording.signals for recording in recordings)
         )
@@ -183,16 +184,13 @@ class Bench:
         bound: float,
     ) -> tuple[Array, Grid, float]:
         """Run one stretch; return outputs on its grid, the grid, and the score of a signal."""
+        grid = self._grid(index, values, drive)
+        if MODELLED in drive:
+            effects = [effect for effect in effects if effect not in self.before]
         composition = compose(effects, values)
         theta = np.array([*(values[name] for name in THETA), DELTA.default, 0.0])
         if HELD in drive:
             theta[STUCK] = IMMENSE
-        grid = self.stretches[index].grid(
-            values.get('phase', 0.0),
-            tuple(drive),
-            values.get('blend', 0.0),
-            values.get('lead', 0.0),
-        )
         outputs = np.empty((BESIDE + 1, grid.u.size))
         slack = min(SLACK, SLACK_SHARE * values['f_s'])
         if {RESTS, CAUGHT} & {*drive}:
@@ -215,6 +213,27 @@ class Bench:
             bound,
         )
         return outputs, grid, score
+
+    def _grid(self, index: int, values: Mapping[str, float], drive: Sequence[str]) -> Grid:
+        """Return the grid on which a valve runs beside a stretch."""
+        stretch, drive = self.stretches[index], tuple(drive)
+        moved = [values.get(name, 0.0) for name in ('phase', 'blend', 'lead')]
+        grid = stretch.grid(moved[0], drive, *moved[1:])
+        if MODELLED not in drive:
+            return grid
+        own = [values[name] for name in values if name.split('.')[0] in (*AHEAD, *self.before)]
+        key = (drive, *moved, *own)
+        return stretch.behind(grid, key, lambda: self._inlet(index, values, drive))
+
+    def _inlet(self, index: int, values: Mapping[str, float], drive: Sequence[str]) -> Array:
+        """Return the p1 that leads p2 from row to row where the effects before the stem lead it.
+
+        What acts back sees the stem as measured.
+        """
+        there = (*(each for each in drive if each in OUTPUTS[:2]), HELD, FINELY)
+        outputs, grid, _ = self._run(index, values, self.before, there, 'x', math.inf)
+        p2, dt = outputs[OUTPUTS.index('p2'), ::PARTS], PARTS * grid.dt[::PARTS]
+        return leading(p2, dt, values['T_g1'], values['T_g2'])
 
     def start(self, index: int, values: Mapping[str, float]) -> Array:
         """Return the state before a stretch: as fitted, else as first measured."""
@@ -319,6 +338,23 @@ class Bench:
         return float(u.min()), float(u.max())
 
 
+def leading(p2: Array, dt: Array, filling: float, emptying: float) -> Array:
+    """Return the inlet pressure, held from row to row, that leads the chamber of eq. (5) along p2.
+
+    Parameters
+    ----------
+    p2, dt : ndarray, shape (m,)
+        Chamber pressure [% of span], and the time since the row before [s].
+    filling, emptying : float
+        Time constants of the chamber [s].
+    """
+    change, step = np.diff(p2, append=p2[-1:]), np.append(dt[1:], 0.0)
+    gain = -np.expm1(-step / np.where(change > 0.0, filling, emptying))
+    return np.where(gain > 0.0, p2 + change / np.maximum(gain, 1e-12), p2)
+
+
+AHEAD = ('f_d1', 'T_g1', 'T_g2', 'p1_0', 'p2_0')
+"""What p2 depends on beside the effects before it; starting values of later stretches as well."""
 THETA = ('f_d1', 'T_g1', 'T_g2', 'f_s', 'f_d', 'a_1', 'a_2')
 
 STUCK, IMMENSE = [THETA.index('f_s'), THETA.index('f_d')], 1e9

@@ -17,7 +17,7 @@ from .fitting import by_cost, FINE, Fitter, GENERATIONS, NARROW, PATIENT, Valve
 from .ladder import climb, concluded, excused, Ladder
 from .rung import Rung
 from .stages import Group
-from .stretch import CAUGHT, HELD, RESTS
+from .stretch import CAUGHT, HELD, MODELLED, RESTS
 from .unknowns import PHASE
 
 
@@ -57,6 +57,9 @@ def climb_all(
                 fitter.drive = _best_drive(fitter, group, valve, ladders)
             # behind a law that is not quite right, what it leaves would be sought again
             drive = tuple(each for each in fitter.drive if each != HELD)
+        elif _carries_on(fitter, group, valve):
+            fitter.bench.before = valve.effects
+            fitter.drive = drive = (*fitter.drive, MODELLED)
         carried = max((each.after.excess for each in ladders), default=0.0)
         ladder = climb(
             fitter,
@@ -175,6 +178,13 @@ def _let_go(fitter: Fitter, ladder: Ladder, guess: Rung | None) -> Ladder | None
 def _within(tell: Progress, start: float, width: float, text: str) -> Callable[[float], object]:
     """Return how to tell the progress of a part of the work."""
     return lambda done: tell(start + width * done, text)
+
+
+def _carries_on(fitter: Fitter, group: Group, valve: Valve) -> bool:
+    """Tell whether a stem is driven by a p2 that the effects named before it explain."""
+    named = {candidate.effect for candidate in valve.candidates}
+    alone = group.stages == ('p2-x',) and group.drive[-1] not in fitter.drive
+    return alone and bool(named) and named == {*valve.effects}
 
 
 def _best_drive(

@@ -18,7 +18,7 @@ from .race import race, rebased
 from .reconsidering import reconsidered
 from .rung import judged, Rung
 from .stages import Candidate, Group
-from .stretch import HELD, PUT_TO_REST
+from .stretch import HELD, MODELLED, PUT_TO_REST
 
 MOST_EFFECTS = 2
 """Most effects named in one group of stages."""
@@ -134,7 +134,7 @@ def climb(
         progress(0.0)
         if refit:
             now, before = seen(find_base(fitter, group, valve, fitter.drive, carried=carried))
-            modelled = group.has_stem and group.drive and not fitter.drive
+            modelled = group.has_stem and group.drive and not {*fitter.drive} - {MODELLED}
             if modelled and before.excess > odds.SPOTLESS:
                 loose, left = seen(loosened(fitter, group, now))
                 if not worth(left):

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """A run of samples without a gap, and the grids on which the compiled model runs beside it."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, NamedTuple
@@ -20,6 +20,11 @@ RESTS, CAUGHT, ON_TIME, HELD = 'x', 'x caught', 'x caught on time', 'x held'
 from there, which leaves a right valve alone; the same, while slips must come at the right moment;
 and at every moment."""
 PUT_TO_REST = {RESTS, CAUGHT, ON_TIME}
+MODELLED, FINELY = 'p2 modelled', 'finely'
+"""Drives by which the chamber receives what leads p2 where the effects found before it lead it:
+they need not run again with every stem; and by which a held stem moves between samples as well."""
+PARTS = 8
+"""Into so many parts is a step cut then."""
 STEM = OUTPUTS.index('x')
 EARLIEST, LATEST = -0.9999, 0.999
 """By how much a command came sooner than the sample that shows it, at least and most [periods]."""
@@ -100,11 +105,28 @@ class Stretch:
         changes come by the share `lead` sooner than steps: it goes on between samples, too.
         """
         key = round(phase, 4), drive, round(blend, 4), round(lead, 4)
+        return self._kept(key, lambda: self._moved(*key))
+
+    def behind(self, grid: Grid, key: tuple[Any, ...], inlet: Callable[[], Array]) -> Grid:
+        """Return a grid on which the chamber receives another inlet pressure, shape (m,).
+
+        `key` tells what that and the grid depend on.
+        """
+
+        def driven() -> Grid:
+            forced = grid.forced.copy()
+            forced[OUTPUTS.index('p1')] = inlet()
+            return grid._replace(forced=forced)
+
+        return self._kept(key, driven)
+
+    def _kept(self, key: tuple[Any, ...], make: Callable[[], Grid]) -> Grid:
+        """Return a grid, made if it is not kept."""
         found = self._grids.get(key)  # other threads may clear them meanwhile
         if found is None:
             if len(self._grids) > KEPT_GRIDS:
                 self._grids.clear()
-            found = self._grids[key] = self._moved(*key)
+            found = self._grids[key] = make()
         return found
 
     def recount(self, counts: Mapping[str, Array]) -> None:
@@ -144,6 +166,8 @@ class Stretch:
         ahead = lead * goes_on(sent) if lead else 0.0
         sooner = np.clip(phase + self.sooner + ahead, EARLIEST, LATEST)
         now, dt, u, rows = interleaved(self.time, sent, sooner)
+        if FINELY in drive:
+            now, dt, u, rows = finer(now, dt, u, rows)
         at_rows = spread(self._at_samples(drive), rows, u.size)
         if HELD in drive:
             # what a loop sees at the end of a step
@@ -171,11 +195,25 @@ class Stretch:
             for name in drive:
                 if name in PUT_TO_REST:
                     forced[STEM] = self.rests
-                elif name != HELD:
+                elif name in OUTPUTS:
                     forced[OUTPUTS.index(name)] = self.measured[name]
             scales = [1.0 / self.noise[name] for name in self.counts]
             found = self._samples[drive] = np.vstack([forced, *self.counts.values(), *scales])
         return found
+
+
+def finer(now: Array, dt: Array, u: Array, rows: Rows) -> tuple[Array, Array, Array, Rows]:
+    """Return what `interleaved` does, each step cut into PARTS."""
+    share = np.arange(1, PARTS + 1) / PARTS
+    between = (now[:-1, None] + np.diff(now)[:, None] * share).ravel()
+    sent = np.repeat(u[:-1], PARTS)
+    sent[PARTS - 1 :: PARTS] = u[1:]
+    return (
+        np.append(now[:1], between),
+        np.append(dt[:1], np.repeat(dt[1:] / PARTS, PARTS)),
+        np.append(u[:1], sent),
+        PARTS * rows,
+    )
 
 
 def blended(u: Array, share: float) -> Array:
