@@ -448,7 +448,7 @@ def test_a_search_for_growing_friction_starts_where_the_stem_holds_as_before():
     group = groups(('x',))[0]
     dwell = next(c for c in group.candidates() if c.effect == 'dwell_friction')
     start = {**dwell.neutral, 'dwell_friction.growth': 0.6}
-    there = dwell.balanced(VALUES['f_s'], VALUES, start)
+    there, _ = dwell.balanced(VALUES['f_s'], VALUES, start)
     assert there['f_s'] * 1.6 == pytest.approx(VALUES['f_s'])
     assert there['f_s'] * there['f_d/f_s'] == pytest.approx(VALUES['f_s'] * VALUES['f_d/f_s'])
 

@@ -32,7 +32,7 @@ from .seen import (
 )
 from .single_slips import slip_by_slip
 from .stages import Candidate, Group
-from .starts import friction_grid, grid, SHARES, START
+from .starts import friction_grid, grid, KINETIC, START
 from .stretch import PUT_TO_REST, RESTS
 
 ROUNDS = ((40, 5), (10, 14), (4, 30))
@@ -277,7 +277,8 @@ def _screened(
     def balanced(start: Mapping[str, float]) -> Bases:
         each = [candidate.balanced(level, usual, start) for level in levels]
         # held as before, the stem may slip as before or further
-        return [{**one, **share} for one in each for share in SHARES if one] or [{}]
+        further = [{**some[0], **share} for some in each if some for share in KINETIC]
+        return [*(one for some in each for one in some), *further] or [{}]
 
     def around(bases: Bases) -> list[Bases]:
         each = [balanced(start) for start in own]

@@ -35,10 +35,13 @@ def slip_by_slip(
     made of the one before: the cost has few valleys then.
     """
     unknowns, signal, drive = problem
-    alone = (unknowns, signal, (*(each for each in drive if each not in PUT_TO_REST), RESTS))
+    effect = CATALOGUE[valve.candidates[-1].effect] if valve.candidates else None
+    # behind a play of the linkage x rests while the stem moves: it must not be stopped then
+    how = CAUGHT if effect and effect.balance and effect.stage == 'sensor' else RESTS
+    alone = (unknowns, signal, (*(each for each in drive if each not in PUT_TO_REST), how))
     apart: dict[tuple[float, ...], list[Mapping[str, float]]] = {}
     names = [unknown.name for unknown in unknowns if unknown.name != 'f_s']
-    for start, stem in product(starts, STEMS):
+    for start, stem in product(starts, ({}, *STEMS)):
         values = {**start, **stem}
         apart.setdefault(tuple(values[name] for name in names), []).append(values)
     nearest = [fitter.scan(valve, some, alone)[0] for some in apart.values()]
@@ -67,7 +70,6 @@ def slip_by_slip(
         found.append(fitter.fit(there, problem, DESCENT))
         return left
 
-    effect = CATALOGUE[valve.candidates[-1].effect] if valve.candidates else None
     if effect and effect.imitated and (not effect.rugged or plain(drive).excess < FAINT):
         # where the base valve leaves nothing, single slips do not lead
         scattered = nearby(each[0].values, unknowns, FINENESS)

@@ -68,17 +68,18 @@ class Candidate:
 
     def balanced(
         self, level: float, values: Mapping[str, float], start: Mapping[str, float]
-    ) -> dict[str, float]:
-        """Return the friction with which a start holds the stem as a level [%] does without it.
+    ) -> list[dict[str, float]]:
+        """Return frictions with which a start holds the stem as a level [%] does without it.
 
-        The stem moves as it does with `values`.
+        The stem moves, or it slips, as it does with `values`; none if that is not declared.
         """
         effect = CATALOGUE[self.effect]
         if effect.balance is None:
-            return {}
+            return []
         f_s = effect.balance(level, *(start[f'{self.effect}.{p.name}'] for p in effect.parameters))
-        f_d = values['f_s'] * values['f_d/f_s']
-        return {'f_s': f_s, 'f_d/f_s': min(f_d / f_s, 1.0)}
+        share = values['f_d/f_s']
+        moves, slips = values['f_s'] * share / f_s, 1.0 - values['f_s'] * (1.0 - share) / f_s
+        return [{'f_s': f_s, 'f_d/f_s': min(max(part, 0.0), 1.0)} for part in (moves, slips)]
 
 
 def starts_of(parameter: EffectParameter) -> tuple[float, ...]:

@@ -39,8 +39,8 @@ STEMS = (
     {'a_1/a_2': 25.0, 'damping': 0.7},
 )
 """A stem that creeps to its place, and one that overshoots."""
-SHARES: tuple[dict[str, float], ...] = ({}, *({'f_d/f_s': share} for share in GRID['f_d/f_s']))
-"""Kinetic friction as found, and others."""
+KINETIC = tuple({'f_d/f_s': share} for share in GRID['f_d/f_s'])
+"""Shares of kinetic friction that are tried."""
 SWEEP = tuple(
     {'a_1/a_2': rate, 'damping': damping}
     for rate in (10.0, 25.0, 60.0)
