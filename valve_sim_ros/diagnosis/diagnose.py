@@ -25,7 +25,7 @@ from .ladder import concluded, Ladder
 from .odds import COARSE
 from .proof import closed, Gap, prove
 from .result import Diagnosis, Named
-from .stages import groups
+from .stages import Group, groups
 from .stretch import CAUGHT
 from .unknowns import complete
 
@@ -63,7 +63,8 @@ def diagnose(
     interruptible : bool
         Let Ctrl-C do the same as `Stop`.
     patience : float
-        Wall time after which it does as if it were stopped [s], once the base valve is fitted.
+        Wall time after which it does as if it were stopped [s], once the base valve is fitted;
+        the time to compile the model does not count.
         With a limit the result may depend on the machine.
 
     Returns
@@ -78,7 +79,7 @@ def diagnose(
     RecordingError
         If the data cannot be read.
     """
-    tell, end = progress or _silent, time.monotonic() + patience
+    tell = progress or _silent
     stops = (Stop, KeyboardInterrupt) if interruptible else (Stop,)
     try:
         tell(0.0, 'reading')
@@ -88,6 +89,9 @@ def diagnose(
         fitter = Fitter(bench, seed=seed)
         parts = groups(bench.signals)
         valve = _known(starting_valve(bench), spec)
+        tell(0.01, 'making ready')
+        _compiled(fitter, parts[-1], valve)
+        end = time.monotonic() + patience
         for group in parts:
             tell(0.05, f'fitting the base valve to {group.signal}')
             later = group is not parts[0]
@@ -130,6 +134,13 @@ def diagnose(
         augmented_valve=augmented,
         seed=seed,
     )
+
+
+def _compiled(fitter: Fitter, group: Group, valve: Valve) -> None:
+    """Have the model with effects compiled: once for all times, and nobody's patience."""
+    candidate = group.candidates()[0]
+    values = {**valve.values, **candidate.neutral}
+    fitter.score(replace(valve, values=values, effects=(candidate.effect,)), group.signal)
 
 
 def _silent(share: float, text: str) -> None:
