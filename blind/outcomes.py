@@ -99,6 +99,13 @@ def read(folder: Path, verdicts: Path, record: str) -> Outcome:
     )
 
 
+def tried(folder: Path, verdicts: Path) -> list[str]:
+    """Return the records that have been diagnosed, or could not be."""
+    names = sorted(path.stem for path in (folder / 'keys').glob('*.json'))
+    ends = ('seconds.json', 'error.txt')
+    return [name for name in names if any((verdicts / name / end).exists() for end in ends)]
+
+
 def read_all(folder: Path, verdicts: Path) -> list[Outcome]:
     """Return the outcomes of all records that have been tried.
 
@@ -109,8 +116,7 @@ def read_all(folder: Path, verdicts: Path) -> list[Outcome]:
     """
     if digest(folder / 'keys') != read_json(folder / 'set.json')['seal']:
         raise ValueError(f'{folder / "keys"}: not the sealed keys; generate the set again')
-    names = sorted(path.stem for path in (folder / 'keys').glob('*.json'))
-    tried = [name for name in names if (verdicts / name).exists()]
-    if not tried:
+    done = tried(folder, verdicts)
+    if not done:
         raise ValueError(f'{verdicts}: no verdicts on {folder}; run `python -m blind run` first')
-    return [read(folder, verdicts, name) for name in tried]
+    return [read(folder, verdicts, name) for name in done]

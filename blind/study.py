@@ -3,11 +3,12 @@
 """The whole study: every set generated, diagnosed and scored, and the table of them all."""
 
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 import subprocess
 
 from . import runner, sets
-from .outcomes import read_all
+from .outcomes import read_all, tried
 from .seal import read_json
 from .table import Scored
 
@@ -15,13 +16,13 @@ SETS = (
     # set, measured signals, number of records
     ('singles', 'p1,p2,x', 150),
     ('singles', 'p2,x', 150),
-    ('singles', 'x', 150),
     ('clean', 'p1,p2,x', 180),
     ('clean', 'p2,x', 60),
     ('clean', 'x', 60),
     ('left_out', 'p1,p2,x', 60),
     ('unknown', 'p1,p2,x', 50),
     ('pairs', 'p1,p2,x', 60),
+    ('singles', 'x', 150),
 )
 
 Progress = Callable[[str, int], Callable[[int], object]]
@@ -45,11 +46,12 @@ def version(root: Path) -> str:
 def scored(folder: Path, verdicts: Path) -> Scored:
     """Score one set."""
     about = read_json(folder / 'set.json')
-    return Scored(about['set'], ','.join(about['signals']), read_all(folder, verdicts))
+    signals = ','.join(about['signals'])
+    return Scored(about['set'], signals, read_all(folder, verdicts), about['count'])
 
 
 def study(split: str, share: float, seed: int, out: Path, progress: Progress) -> list[Scored]:
-    """Generate and diagnose all sets, then open their keys.
+    """Generate and diagnose all sets, then open their keys; if interrupted, of those diagnosed.
 
     Parameters
     ----------
@@ -72,7 +74,12 @@ def study(split: str, share: float, seed: int, out: Path, progress: Progress) ->
             bar = progress(f'{folder.name}: records', wanted)
             sets.generate(name, split, tuple(signals.split(',')), wanted, seed, folder, bar)
         folders.append(folder)
-    for folder in folders:
-        bar = progress(f'{folder.name}: verdicts', read_json(folder / 'set.json')['count'])
-        runner.run(folder, folder / 'verdicts', progress=bar)
-    return [scored(folder, folder / 'verdicts') for folder in folders]
+    with suppress(KeyboardInterrupt):
+        for folder in folders:
+            bar = progress(f'{folder.name}: verdicts', read_json(folder / 'set.json')['count'])
+            runner.run(folder, folder / 'verdicts', progress=bar)
+    return [
+        scored(folder, folder / 'verdicts')
+        for folder in folders
+        if tried(folder, folder / 'verdicts')
+    ]

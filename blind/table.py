@@ -23,11 +23,18 @@ TARGETS = {
 
 
 class Scored(NamedTuple):
-    """A set with its outcomes; `signals` as in 'p2,x'."""
+    """A set with its outcomes; `signals` as in 'p2,x'; how many records were drawn for it."""
 
     kind: str
     signals: str
     outcomes: list[Outcome]
+    drawn: int = 0
+
+    @property
+    def size(self) -> str:
+        """Return how many records were diagnosed, of how many if not all were."""
+        done = len(self.outcomes)
+        return f'{done} of {self.drawn} records' if self.drawn > done else f'{done} records'
 
     @property
     def target(self) -> str:
@@ -119,7 +126,7 @@ def one_by_one(scored: Scored) -> str:
 
 def as_text(scored: Scored) -> str:
     """Return the score of one set for the terminal."""
-    text = [f'{scored.kind} {scored.signals}: {len(scored.outcomes)} records']
+    text = [f'{scored.kind} {scored.signals}: {scored.size}']
     if scored.target:
         text.append(f'  {"target":28}{scored.target}')
     text += [f'  {name:28}{figure}' for name, figure in lines(scored)]
@@ -154,7 +161,8 @@ def as_markdown(sets: Sequence[Scored], split: str, version: str, command: str) 
         'two processes; target ≤ 20 s.',
     ]
     for scored in sets:
-        text += ['', f'## {scored.kind} — u, {scored.signals.replace(",", ", ")}', '']
+        signals = scored.signals.replace(',', ', ')
+        text += ['', f'## {scored.kind} — u, {signals}: {scored.size}', '']
         if scored.target:
             text += [f'Target: {scored.target}.', '']
         text += ['| | |', '|---|---|']

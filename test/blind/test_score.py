@@ -11,7 +11,7 @@ from click.testing import CliRunner
 import numpy as np
 import pytest
 
-from blind import runner, score, table
+from blind import runner, score, study, table
 from blind.__main__ import main
 from blind.continuation import gap_closed
 from blind.outcomes import FAILED, MISSING, Outcome, read_all, UNKNOWN
@@ -189,6 +189,27 @@ def test_the_table_of_all_sets(one_record):
     assert '| false alarms | 100.0 % [20.7, 100.0] (1 of 1) |' in text
     assert 'stated 93.5 % ' not in text
     assert '93.5 % stated, 50.0 % right' in text
+
+
+def test_that_a_study_that_is_interrupted_scores_what_was_done(one_record, monkeypatch):
+    home = one_record.folder / 'study'
+    home.mkdir()
+    (home / 'singles_test_p2x').symlink_to(one_record.folder)
+    about = json.loads((one_record.folder / 'set.json').read_text())
+    write_json(one_record.folder / 'set.json', {**about, 'count': 3})
+    sets = (('singles', 'p2,x', 3), ('clean', 'x', 1))
+    monkeypatch.setattr(study, 'SETS', sets)
+
+    def interrupted(folder, out, progress):
+        (out / '0002').mkdir()
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(runner, 'run', interrupted)
+    monkeypatch.setattr(study.sets, 'generate', lambda *some: write_json(some[5] / 'set.json', {}))
+    (home / 'clean_test_x').mkdir()
+    (found,) = study.study('test', 1.0, 0, home, lambda title, total: lambda done: None)
+    assert found.size == '1 of 3 records'
+    assert '## singles — u, p2, x: 1 of 3 records' in table.as_markdown([found], 'test', '', '')
 
 
 def stub(monkeypatch, diagnose):
