@@ -105,6 +105,11 @@ OTHER_FORMS = [
         {'bristle': 2.0, 'bristle_stribeck': 1.0, 'bristle_elastic': 0.6},
         {'compliance': 0.5, 'drop_speed': 1.0, 'elastic': 0.6},
     ),
+    (
+        'travel_stops',
+        {'stop_low': 25.0, 'stop_high': 70.0, 'stop_stiffness': 25.0},
+        {'lower': 25.0, 'upper': 70.0, 'compliance': 0.04},
+    ),
     ('presliding', {'brittle': 5.0}, {'compliance': 0.0, 'stuck_compliance': 0.2}),
     (
         'nonlinear_flow',

@@ -33,9 +33,11 @@ DWELL, DWELLS, SCATTER = 'dwell_friction', tuple(np.geomspace(0.5, 200.0, 16).to
 DRIFT, SETTLINGS, TOLD_BETTER = 'friction_drift', (0.0, *np.geomspace(2.0, 40.0, 8).tolist()), 0.5
 """The effect, rates at which it settles that are tried [1/h], and the part of what scatters that
 it leaves at most."""
-STOPS, OUTERMOST, BEYOND = 'travel_stops', 0.01, 1.0
-"""The effect, the share of rests that may lie beyond a stop, and by how much more is left unmoved
-there than holds the stem elsewhere [% of span]."""
+STOPS, OUTERMOST, BEYOND, LEAST_PRESSED = 'travel_stops', 0.01, 1.0, 5
+"""The effect, the share of rests that may lie beyond a stop, by how much more is left unmoved
+there than holds the stem elsewhere [% of span], and samples that show how far one yields."""
+YIELDS, MOST_GIVEN = 2.5, 0.3
+"""How far it may yield [% of span], and its compliance."""
 SHAKES, AMPLITUDES = 'vibration', (0.4, 1.0, 2.5)
 """The effect, and amplitudes from which a search starts [% of span]."""
 EARLY, CARRIED = (-0.6, 0.0), (0.2, 0.8)
@@ -186,7 +188,7 @@ def shaken_seen(bench: Bench, held: float) -> list[dict[str, float]]:
 
 
 def stops_seen(bench: Bench, results: Sequence[Array]) -> list[dict[str, float]]:
-    """Return starts of stops: the outermost places of rest, and what holds the stem elsewhere.
+    """Return starts of stops, hard and yielding: where the stem rests outermost, whatever p2 does.
 
     `results` as for `friction_seen`; none if p2 moves the stem there as it does elsewhere.
     """
@@ -197,21 +199,31 @@ def stops_seen(bench: Bench, results: Sequence[Array]) -> list[dict[str, float]]
     rests, force = rests[known], force[known]
     if rests.size < LEAST_RESTS:
         return []
-    found: dict[str, float] = {}
+    outermost: dict[str, float] = {}
+    hard: dict[str, float] = {}
+    soft: dict[str, float] = {}
     there = np.zeros(rests.size, dtype=bool)
     for name, way, share in (('lower', -1.0, OUTERMOST), ('upper', 1.0, 1.0 - OUTERMOST)):
         level = float(np.quantile(rests, share, method='nearest'))
-        near = np.abs(rests - level) < LEAVES * bench.noise['x']
+        near = np.abs(rests - level) < YIELDS
         if near.all():
             return []
-        if (way * force)[near].max() > np.quantile((way * force)[~near], 0.995) + BEYOND:
-            found[f'{STOPS}.{name}'] = float(np.median(rests[near]))
-            there |= near
-    if there.all():
+        outermost[f'{STOPS}.{name}'] = level
+        most = way * float(np.quantile((way * force)[~near], 0.995))
+        pressed = near & (way * (force - most) > 0.0)
+        if pressed.sum() < LEAST_PRESSED or (way * (force - most))[near].max() <= BEYOND:
+            continue
+        given, place = np.polyfit(force[pressed] - most, rests[pressed], 1)
+        hard[f'{STOPS}.{name}'] = float(np.median(rests[pressed]))
+        soft[f'{STOPS}.{name}'] = float(place)
+        soft[f'{STOPS}.compliance'] = float(np.clip(given, 0.0, MOST_GIVEN))
+        there |= near
+    if not hard or there.all():
         return []
     low, high = np.quantile(force[~there], (0.005, 0.995))
-    starts = [{name: value} for name, value in found.items()]
-    starts += [found] if len(found) > 1 else []
+    one_each = [{name: value} for name, value in hard.items()]
+    # one that is never pressed hard enough to show may be where the stem rests outermost
+    starts = [*one_each, outermost | hard, soft, outermost | soft]
     return [{**start, 'f_s': float(high - low) / 2.0} for start in starts]
 
 

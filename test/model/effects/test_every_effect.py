@@ -216,6 +216,17 @@ def test_stem_stays_inside_the_stops():
     assert s.x.max() == 70.0
 
 
+def test_a_stop_that_yields_gives_way_as_its_compliance_tells():
+    spec = {'effects': ['travel_stops'], 'travel_stops.upper': 60.0, 'f_s': 2.0, 'f_d': 1.0}
+    u = np.repeat([50.0, 90.0], 300)
+    # kinetic friction holds 1 % of what p2 presses it beyond the stop
+    for compliance in (0.0, 0.05):
+        s = simulate(u, parameters={**spec, 'travel_stops.compliance': compliance})
+        beyond = compliance / (1.0 + compliance) * (s.p2[-1] - 60.0)
+        assert s.x[-1] == pytest.approx(60.0 + beyond, abs=0.15)
+        assert s.x[-1] > 60.0 or not compliance
+
+
 def share_apart(effects):
     """Return how often samples differ from many short ones, by signal."""
     time = 0.2 * np.arange(750)
