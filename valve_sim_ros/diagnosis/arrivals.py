@@ -12,9 +12,10 @@ from ..recordings.recording import OUTPUTS
 from . import odds
 from .adequacy import leftover
 from .fitting import Fitter, Problem, Valve
+from .interleaving import Rows
 from .seen import ENOUGH_STEPS, LEAST_EACH
 from .stages import Group
-from .stretch import Rows, shifted, Stretch
+from .stretch import shifted, Stretch
 
 WHOLE, MOST = 0.3, 0.7
 """So near to a whole period, and so many of the steps."""

@@ -17,6 +17,7 @@ from ..model.scoring import BESIDE
 from ..recordings.recording import OUTPUTS, Recording
 from .adequacy import LOWEST
 from .errors import DiagnosisError
+from .pushing import AHEAD, leading, PARTS
 from .readings import (
     between_lines,
     bridged,
@@ -32,7 +33,7 @@ from .readings import (
     straightened,
     wild,
 )
-from .stretch import CAUGHT, FINELY, Grid, HELD, MODELLED, ON_TIME, PARTS, RESTS, Stretch
+from .stretch import CAUGHT, FINELY, Grid, HELD, MODELLED, ON_TIME, RESTS, Stretch
 
 LEAST_PART = 20
 """A part of no more samples between two gaps tells nothing."""
@@ -338,23 +339,6 @@ class Bench:
         return float(u.min()), float(u.max())
 
 
-def leading(p2: Array, dt: Array, filling: float, emptying: float) -> Array:
-    """Return the inlet pressure, held from row to row, that leads the chamber of eq. (5) along p2.
-
-    Parameters
-    ----------
-    p2, dt : ndarray, shape (m,)
-        Chamber pressure [% of span], and the time since the row before [s].
-    filling, emptying : float
-        Time constants of the chamber [s].
-    """
-    change, step = np.diff(p2, append=p2[-1:]), np.append(dt[1:], 0.0)
-    gain = -np.expm1(-step / np.where(change > 0.0, filling, emptying))
-    return np.where(gain > 0.0, p2 + change / np.maximum(gain, 1e-12), p2)
-
-
-AHEAD = ('f_d1', 'T_g1', 'T_g2', 'p1_0', 'p2_0')
-"""What p2 depends on beside the effects before it; starting values of later stretches as well."""
 THETA = ('f_d1', 'T_g1', 'T_g2', 'f_s', 'f_d', 'a_1', 'a_2')
 
 STUCK, IMMENSE = [THETA.index('f_s'), THETA.index('f_d')], 1e9

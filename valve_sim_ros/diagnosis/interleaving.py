@@ -6,8 +6,11 @@ from typing import Any
 
 from numba import njit
 import numpy as np
+import numpy.typing as npt
 
 from ..model.pipeline import Array
+
+Rows = npt.NDArray[np.intp]
 
 
 @njit(cache=True, nogil=True)

@@ -12,7 +12,8 @@ import numpy.typing as npt
 
 from ..model.pipeline import Array
 from ..recordings.recording import OUTPUTS
-from .interleaving import interleaved, spread
+from .interleaving import interleaved, Rows, spread
+from .pushing import finer
 
 KEPT_GRIDS = 60
 RESTS, CAUGHT, ON_TIME, HELD = 'x', 'x caught', 'x caught on time', 'x held'
@@ -23,14 +24,11 @@ PUT_TO_REST = {RESTS, CAUGHT, ON_TIME}
 MODELLED, FINELY = 'p2 modelled', 'finely'
 """Drives by which the chamber receives what leads p2 where the effects found before it lead it:
 they need not run again with every stem; and by which a held stem moves between samples as well."""
-PARTS = 8
-"""Into so many parts is a step cut then."""
 STEM = OUTPUTS.index('x')
 EARLIEST, LATEST = -0.9999, 0.999
 """By how much a command came sooner than the sample that shows it, at least and most [periods]."""
 MOVES = 4.0
 """What begins by more than this within two samples moves [noise]."""
-Rows = npt.NDArray[np.intp]
 
 
 class Grid(NamedTuple):
@@ -200,20 +198,6 @@ class Stretch:
             scales = [1.0 / self.noise[name] for name in self.counts]
             found = self._samples[drive] = np.vstack([forced, *self.counts.values(), *scales])
         return found
-
-
-def finer(now: Array, dt: Array, u: Array, rows: Rows) -> tuple[Array, Array, Array, Rows]:
-    """Return what `interleaved` does, each step cut into PARTS."""
-    share = np.arange(1, PARTS + 1) / PARTS
-    between = (now[:-1, None] + np.diff(now)[:, None] * share).ravel()
-    sent = np.repeat(u[:-1], PARTS)
-    sent[PARTS - 1 :: PARTS] = u[1:]
-    return (
-        np.append(now[:1], between),
-        np.append(dt[:1], np.repeat(dt[1:] / PARTS, PARTS)),
-        np.append(u[:1], sent),
-        PARTS * rows,
-    )
 
 
 def blended(u: Array, share: float) -> Array:
