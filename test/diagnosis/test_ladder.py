@@ -10,7 +10,7 @@ import pytest
 from scipy.signal import lfilter
 
 from valve_sim_ros import simulate
-from valve_sim_ros.diagnosis import diagnose
+from valve_sim_ros.diagnosis import diagnose, reconsidering
 from valve_sim_ros.diagnosis import race as racing
 from valve_sim_ros.diagnosis.adequacy import Leftover, leftover
 from valve_sim_ros.diagnosis.base_valve import starting_valve
@@ -29,6 +29,7 @@ from valve_sim_ros.diagnosis.race import race
 from valve_sim_ros.diagnosis.reconsidering import reconsidered
 from valve_sim_ros.diagnosis.rung import judged, Rung
 from valve_sim_ros.diagnosis.stages import groups
+from valve_sim_ros.diagnosis.stretch import CAUGHT
 from valve_sim_ros.recordings.recording import Recording
 
 STEM = groups(('p1', 'p2', 'x'))[-1]
@@ -225,6 +226,50 @@ def test_a_first_effect_that_the_second_makes_needless_is_dropped():
     assert rungs[0].after.excess < 0.05
 
 
+def test_a_first_effect_keeps_its_name_though_its_search_anew_ends_worse(monkeypatch):
+    effects = {'spring_preload.pressure': 8.0, 'sensor_drift.rate': 40.0}
+    fitter, base = fitted(measured(**effects))
+    chosen = {c.effect: c for c in STEM.candidates() if c.names != ('pressure', 'seat')}
+    added = chosen['spring_preload'], chosen['sensor_drift']
+    both = base
+    for each in reversed(added):
+        both, *_ = race(fitter, STEM, both, [each])
+    both = replace(both, candidates=added)
+
+    def rung(effect, valve):
+        after = leftover(fitter.residuals(valve, 'x'))
+        before = leftover(fitter.residuals(base, 'x'))
+        gains = {'spring_preload': 2e4, 'sensor_calibration': 1.9e4}
+        return Rung(effect, 'p2-x', gains, before, after, 0.9, 0.9, (), valve)
+
+    def badly(*how, **more):
+        worse = {'spring_preload': 2.0}
+        found = race(*how, **more)
+        found = [replace(e, cost=worse.get(e.candidates[-1].effect, 1.0) * e.cost) for e in found]
+        return sorted(found, key=by_cost)
+
+    monkeypatch.setattr(reconsidering, 'race', badly)
+    first = replace(both, candidates=added[:1])
+    rungs = [rung('spring_preload', first), rung('sensor_drift', both)]
+    found = reconsidered(fitter, STEM, base, rungs)
+    assert [each.effect for each in found] == ['spring_preload', 'sensor_drift']
+    assert found[-1].valve.cost == both.cost
+
+
+def test_a_bump_is_found_beside_another_effect_though_next_to_none_costs_least_at_first():
+    effects = {'friction_drift.rate': 6.0}
+    bump = {'height': 0.9, 'centre': 45.0, 'width': 10.0}
+    bump = {f'position_dependent_friction.{name}': value for name, value in bump.items()}
+    fitter, base = fitted(measured(**effects, **bump))
+    fitter.drive = (CAUGHT,)
+    candidates = {(c.effect, len(c.names)): c for c in STEM.candidates()}
+    for effect, size in (('friction_drift', 1), ('position_dependent_friction', 3)):
+        base, *_ = race(fitter, STEM, base, [candidates[effect, size]])
+    assert leftover(fitter.residuals(base, 'x')).excess < 0.05
+    assert base.values['position_dependent_friction.centre'] == pytest.approx(45.0, abs=3.0)
+    assert base.values['friction_drift.rate'] == pytest.approx(6.0, rel=0.1)
+
+
 @pytest.mark.slow
 def test_a_train_of_slips_is_put_together_from_single_slips():
     rng = np.random.default_rng(0)
@@ -246,14 +291,14 @@ def test_a_train_of_slips_is_put_together_from_single_slips():
 
 def test_a_laborious_effect_does_not_run_where_another_explains_the_signal(monkeypatch):
     fitter, base = fitted(measured(**{'travel_stops.upper': 60.0}))
-    screened = racing._screened
+    screened = racing.screened
     tried = []
 
     def noted(fitter, candidate, *more):
         tried.append(candidate.effect)
         return screened(fitter, candidate, *more)
 
-    monkeypatch.setattr(racing, '_screened', noted)
+    monkeypatch.setattr(racing, 'screened', noted)
     some = [c for c in STEM.candidates() if c.effect in ('travel_stops', 'stribeck_friction')]
     found = race(fitter, STEM, base, some)
     assert found == sorted(found, key=by_cost)
@@ -327,7 +372,7 @@ def test_where_nothing_is_left_stribeck_friction_is_sought_beside_a_rare_base_va
         tried.append(candidate.effect)
         return replace(base, cost=1.0, candidates=(candidate,))
 
-    monkeypatch.setattr(racing, '_screened', screened)
+    monkeypatch.setattr(racing, 'screened', screened)
     monkeypatch.setattr(Fitter, 'evolve', lambda self, valve, *rest: valve)
     monkeypatch.setattr(Fitter, 'fit', lambda self, valve, *rest: valve)
     rare = replace(base, values={**base.values, 'f_d/f_s': drop})

@@ -16,7 +16,7 @@ from .coarse import rounded
 from .fitting import by_cost, FINE, Fitter, GENERATIONS, NARROW, PATIENT, Valve
 from .ladder import climb, concluded, excused, Ladder
 from .rung import Rung
-from .stages import Group
+from .stages import Candidate, Group
 from .stretch import CAUGHT, HELD, MODELLED, RESTS
 from .unknowns import PHASE
 
@@ -61,17 +61,26 @@ def climb_all(
             fitter.bench.before = valve.effects
             fitter.drive = drive = (*fitter.drive, MODELLED)
         carried = max((each.after.excess for each in ladders), default=0.0)
-        ladder = climb(
-            fitter,
-            group,
-            valve,
-            candidates,
+        climbing = partial(climb, fitter, group, named=added, stops=stops)
+        first = partial(
+            climbing,
             refit=bool(ladders),
-            named=added,
             carried=carried,
             progress=_within(tell, share, width, text),
-            stops=stops,
         )
+        again = partial(
+            climbing, refit=True, progress=_within(tell, share + width, 0.0, f'{text} again')
+        )
+        # x that keeps to steps is told by these
+        stepped = bool(fitter.bench.grid_of_x[0]) and any(
+            each.effect == odds.COARSE for each in candidates
+        )
+        if stepped and group.has_stem:
+            ladder = first(valve, candidates, hastily=True)
+        elif group.stages == ('p2-x',):
+            ladder = _quickly(fitter, valve, candidates, first, again, stops)
+        else:
+            ladder = first(valve, candidates)
         fitter.drive = drive
         ladder = concluded(ladder)
         if added:
@@ -83,24 +92,13 @@ def climb_all(
             )
             ladder = excused(ladder, plain, carried, sure=sure)
         if group.has_stem and ladder.complete:
-            again = partial(
-                climb,
-                fitter,
-                group,
-                ladder.valve,
-                refit=True,
-                named=added,
-                progress=_within(tell, share + width, 0.0, f'{text} again'),
-                stops=stops,
-            )
-            if fitter.bench.grid_of_x[0] and any(
-                each.effect == odds.COARSE for each in candidates
-            ):
+            again = partial(again, ladder.valve)
+            if stepped:
                 ladder = rounded(fitter, ladder, candidates, again)
             elif candidates and ladder.outcome == 'unknown_effect':
-                first, ladder = ladder, replace(ladder, complete=False)
+                unknown, ladder = ladder, replace(ladder, complete=False)
                 with suppress(*stops):
-                    ladder = _second_look(fitter, first, partial(again, candidates))
+                    ladder = _second_look(fitter, unknown, partial(again, candidates))
         if not ladder.complete:
             tell = _stop
         ladders.append(ladder)
@@ -140,6 +138,38 @@ def _second_look(fitter: Fitter, ladder: Ladder, again: Callable[[], Ladder]) ->
         if named := _let_go(fitter, ladder, found.best_guess):
             return named
     return replace(ladder, complete=complete)
+
+
+def _quickly(
+    fitter: Fitter,
+    valve: Valve,
+    candidates: Sequence[Candidate],
+    climbing: Callable[..., Ladder],
+    again: Callable[..., Ladder],
+    stops: tuple[type[BaseException], ...],
+) -> Ladder:
+    """Return the ladder of a stem, searches that take long only if nothing else explains it.
+
+    One slip that comes at another moment spoils all that a free stem does until the next one: of
+    two effects each looks as if it explained nothing. So before these it is looked at caught.
+    """
+    hasty = climbing(valve, candidates, hastily=True)
+    unknown = concluded(hasty).outcome == 'unknown_effect'
+    if not unknown or not hasty.complete or hasty.before.excess <= odds.CLEAN:
+        return hasty
+    drive = fitter.drive
+    fitter.drive = (*drive, CAUGHT)
+    found = concluded(again(hasty.base, candidates, hastily=True))
+    fitter.drive = drive
+    if found.outcome == 'missing_effect':
+        group, free = found.group, found.valve
+        with suppress(*stops):
+            free = fitter.refined(free, fitter.problem(group, free))
+        after = leftover(fitter.residuals(free, group.signal))
+        names = [rung.effect for rung in found.rungs]
+        if odds.explained(group.signal, hasty.before, after, names):
+            return replace(found, base=hasty.base, valve=free, before=hasty.before, after=after)
+    return climbing(hasty.base, candidates, refit=False, raced=hasty.raced)
 
 
 def _patiently(fitter: Fitter, ladder: Ladder, guess: Rung) -> Ladder:

@@ -42,6 +42,8 @@ class Ladder:
     """Whether all that could be missing was tried; not so if the diagnosis was stopped."""
     blurred: float = 0.0
     """Excess that comes of the noise of a measured x."""
+    raced: tuple[Valve, ...] = ()
+    """How its first race ended."""
 
     @property
     def told(self) -> str:
@@ -58,6 +60,8 @@ def climb(
     refit: bool,
     named: bool = False,
     carried: float = 0.0,
+    hastily: bool = False,
+    raced: Sequence[Valve] = (),
     progress: Callable[[float], object],
     stops: tuple[type[BaseException], ...],
 ) -> Ladder:
@@ -80,6 +84,10 @@ def climb(
     carried : float
         Excess that the signals before this one leave: if that is more than noise, no more than
         that says nothing.
+    hastily : bool
+        Leave out effects whose search takes long, but beside one that explains most.
+    raced : sequence of Valve
+        What a first race ended with when done hastily.
     progress : callable
         Called with the share done.
     stops : tuple of type
@@ -87,6 +95,7 @@ def climb(
     """
     rungs: list[Rung] = []
     guess = None
+    first: list[Valve] = [*raced]
     chance: Leftover | None = None  # left where the gap is but slips that hang on noise
     complete = False
     again = not PUT_TO_REST.isdisjoint(fitter.drive)
@@ -149,8 +158,18 @@ def climb(
                 break
             told = _within(progress, step)
             # in the second look the stem is put to rest already, no valley of the base is missed
-            deeply = group.has_stem and some is candidates and not rungs and not again
-            runners = race(fitter, group, now, some, told, deeply=deeply)
+            deeply = group.has_stem and some is candidates and not (rungs or again or hastily)
+            runners = race(
+                fitter,
+                group,
+                now,
+                some,
+                told,
+                deeply=deeply,
+                hastily=hastily and not rungs and before.excess > odds.CLEAN,
+                raced=raced if some is candidates and not rungs else (),
+            )
+            first = first or runners
             now = rebased(fitter, group, now, runners[:5])
             before = leftover(fitter.residuals(now, group.signal))
             if not rungs:
@@ -166,9 +185,9 @@ def climb(
             with suppress(*stops):  # an end here leaves the name as it is
                 rung = _with(fitter, group, rung, on_other_side(fitter, group, rung.valve))
                 rung = _on_time(fitter, group, rung)
-            gained, first = rung.gains[rung.effect], not rungs
+            gained = rung.gains[rung.effect]
             if not odds.strong(
-                group.signal, before, gained, rung.closed, first=first, named=named
+                group.signal, before, gained, rung.closed, first=not rungs, named=named
             ):
                 guess = guess or rung
                 break
@@ -187,6 +206,8 @@ def climb(
                     break
                 if CATALOGUE[rung.effect].rugged and not again:
                     break
+                if hastily and not again and rung.closed < odds.MOSTLY:
+                    break
             rungs.append(rung)
             now, before = rung.valve, rung.after  # first, so that an end here loses nothing
             rung = rungs[-1] = _with_its_own_stem(fitter, group, rung)
@@ -198,13 +219,23 @@ def climb(
                 break
             others = [each for each in candidates if each.effect != rung.effect]
             quick = [each for each in others if not CATALOGUE[each.effect].laborious]
-            candidates = quick if again else others
+            candidates = quick if again and not hastily else others
         progress(1.0)
         complete = True
     after = before if rungs else leftover(fitter.residuals(now, group.signal))
     blurred = odds.blurred(now, fitter.bench.noise)
     return Ladder(
-        group, 'adequate', base, now, base_left, after, tuple(rungs), guess, complete, blurred
+        group,
+        'adequate',
+        base,
+        now,
+        base_left,
+        after,
+        tuple(rungs),
+        guess,
+        complete,
+        blurred,
+        tuple(first),
     )
 
 

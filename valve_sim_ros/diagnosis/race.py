@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The race: each candidate effect is refitted together with the base valve of its group."""
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from functools import partial
@@ -16,8 +16,9 @@ from ..model.pipeline import Array
 from . import odds
 from .adequacy import leftover
 from .alike import alike
-from .base_valve import find_base, with_any_stem
-from .fitting import by_cost, eased, FAINT, Fitter, LONG, Problem, SHORT, Valve
+from .base_valve import find_base
+from .fitting import by_cost, FAINT, Fitter, Valve
+from .screening import Bases, screened
 from .seen import (
     calibration_seen,
     DRIFT,
@@ -30,19 +31,14 @@ from .seen import (
     STOPS,
     stops_seen,
 )
-from .single_slips import slip_by_slip
 from .stages import Candidate, Group
-from .starts import friction_grid, grid, KINETIC, START
-from .stretch import PUT_TO_REST, RESTS
+from .starts import friction_grid, grid, START
+from .stretch import RESTS
 
 ROUNDS = ((40, 5), (10, 14), (4, 30))
 """Rounds of a race where costs are rugged: how many still run, and for how many generations."""
-MOST_STARTS, FEWER_STARTS = 24, 8
-"""Up to so many starts of an effect are tried with each level of friction; if there are more, only
-so many of the best."""
-SCREENED, SCREENED_IF_SMOOTH, FINISHERS, REFINED = 3, 8, 5, 2
-"""How many starts of a candidate are followed (more without a stem: such fits are quick), runners
-refitted, and refined to the end."""
+FINISHERS, REFINED = 5, 2
+"""How many runners are refitted, and refined to the end."""
 FAR_AHEAD, BEHIND = 0.2, 0.5
 """Where the best leaves no more than this part of the cost, or nothing but noise, runners short of
 more than a part of its gain are not followed."""
@@ -50,10 +46,11 @@ NEARLY_ALL = 0.02
 """What the best may leave of the excess, and no more than noise, where effects that take long and
 do not look like it are not tried."""
 
+PROMISING = 0.05
+"""Part of the gap that a first refit must close for any to be followed before all have begun."""
 DEEPENED = 3
 """So many effects are searched more deeply where none explains what is left."""
 
-Bases = list[dict[str, float]]
 LAGS = ('T_g1', 'T_g2')
 
 
@@ -65,10 +62,13 @@ def race(
     progress: Callable[[float], object] = lambda share: None,
     *,
     deeply: bool = False,
+    hastily: bool = False,
+    raced: Sequence[Valve] = (),
 ) -> list[Valve]:
     """Return valves with one more effect, best first; the better, the more refitted.
 
-    `deeply` searches for the base valve anew beside the best.
+    `deeply` searches for the base valve anew beside the best, `hastily` leaves out effects whose
+    search takes long if no other one explains nearly all. `raced` is what that ended with before.
     """
     seen: dict[str, tuple[float, ...]] = {}
     # without the effect a valve may have found its lags far off
@@ -108,9 +108,9 @@ def race(
         progress(done / len(candidates))
         return runner
 
-    def screened(candidate: Candidate) -> Valve:
+    def begun(candidate: Candidate) -> Valve:
         own, suited = candidate.starts(seen), candidate.suited(shown.get(candidate.effect, []))
-        return _screened(fitter, candidate, group, valve, own, suited, frictions, lags, held)
+        return screened(fitter, candidate, group, valve, own, suited, frictions, lags, held)
 
     def evolved(runner: Valve, generations: int) -> Valve:
         more = fitter.evolve(runner, fitter.problem(group, runner), generations)
@@ -146,14 +146,32 @@ def race(
             others = [each for each in runners if each not in ahead]
             return sorted([*pool.map(how, ahead), *others], key=by_cost)
 
-        def heat(ahead: list[Valve], some: Sequence[Candidate]) -> list[Valve]:
-            """Return the runners with some more, which are refitted as far as they lead."""
-            if not some:
+        left = excess(valve)
+        gap = valve.cost * left / (1.0 + left)
+        waiting: list[Valve] = []
+
+        def promising(runners: Sequence[Valve]) -> bool:
+            gained = max((valve.cost - each.cost for each in runners), default=0.0)
+            return not group.has_stem or gained >= PROMISING * gap
+
+        def heat(
+            ahead: list[Valve], some: Sequence[Candidate], *, last: bool = False
+        ) -> list[Valve]:
+            """Return the runners with some more, which are refitted as far as they lead.
+
+            If none of them is promising they wait for those of the next heat.
+            """
+            nonlocal waiting
+            fresh = sorted([*waiting, *map(count, pool.map(begun, some))], key=by_cost)
+            waiting = []
+            if not fresh:
                 return ahead
-            fresh = sorted(map(count, pool.map(screened, some)), key=by_cost)
-            for left, generations in ROUNDS if group.has_stem else ():
-                last = sorted(each.cost for each in (*ahead, *fresh))[:left][-1]
-                among = sum(each.cost <= last for each in fresh)
+            if not (last or promising(fresh)):
+                waiting = fresh
+                return ahead
+            for most, generations in ROUNDS if group.has_stem else ():
+                slowest = sorted(each.cost for each in (*ahead, *fresh))[:most][-1]
+                among = sum(each.cost <= slowest for each in fresh)
                 if among:
                     fresh = followed(partial(evolved, generations=generations), fresh, among)
             runners = followed(fitted, sorted([*ahead, *fresh], key=by_cost), FINISHERS, ahead)
@@ -162,20 +180,36 @@ def race(
             near = sum(excess(each) <= odds.CLEAN for each in runners[:REFINED])
             return followed(refined, runners, near or REFINED, ahead)
 
-        slow = [each for each in candidates if _slow(each.effect)]
-        quick = [each for each in candidates if each not in slow]
-        runners = heat([], quick)
+        def nearly_all(best: Valve) -> bool:
+            return excess(best) <= min(odds.CLEAN, NEARLY_ALL * left)
+
+        tiers: list[list[Candidate]] = [[], [], []]
+        for each in candidates:
+            tiers[_tier(each.effect)].append(each)
+        quick, imitated, slow = tiers
+        if raced and not promising(raced):
+            runners, waiting = [], [*raced]
+        else:
+            runners = [*raced] or heat([], quick)
+        if runners and nearly_all(runners[0]):
+            effect = runners[0].candidates[-1].effect
+            imitated = [e for e in imitated if odds.look_alike(effect, e.effect)]
+        runners = runners if raced else heat(runners, imitated)
+        ended = sorted([*runners, *waiting], key=by_cost)
+        if hastily and ended and not nearly_all(ended[0]):
+            return alike(fitter, group, ended)
         if deeply and runners:
-            runners = _deepened(fitter, group, valve, runners, quick, progress)
-        best = runners[0] if runners else valve
-        left = excess(valve)
+            ended = runners = _deepened(
+                fitter, group, valve, runners, [*quick, *imitated], progress
+            )
+        best = ended[0] if ended else valve
         hidden = [e for e in slow if left < FAINT and odds.imitates(valve, e.effect)]
-        if excess(best) <= min(odds.CLEAN, NEARLY_ALL * left):
+        if nearly_all(best):
             effect = best.candidates[-1].effect
             slow = [e for e in slow if e in hidden or odds.look_alike(effect, e.effect)]
-        elif runners and left < (odds.CLEAN if valve.candidates else FAINT):
+        elif ended and left < (odds.CLEAN if valve.candidates else FAINT):
             slow = [e for e in slow if e in hidden or not CATALOGUE[e.effect].laborious]
-        runners = heat(runners, slow)
+        runners = heat(runners, slow, last=True)
         if deeply:
             runners = _deepened(fitter, group, valve, runners, slow, progress)
     return alike(fitter, group, runners)
@@ -186,9 +220,12 @@ def _shifted(candidate: Candidate) -> bool:
     return candidate.effect == odds.COARSE and 'offset' in candidate.names
 
 
-def _slow(effect: str) -> bool:
-    """Tell whether a search for an effect takes many times as long as one for another."""
-    return CATALOGUE[effect].laborious or CATALOGUE[effect].rugged
+def _tier(effect: str) -> int:
+    """Return how late an effect is tried: a search for one takes many times as long as another."""
+    declared = CATALOGUE[effect]
+    if declared.laborious or declared.rugged:
+        return 2
+    return 1 if declared.imitated else 0
 
 
 def in_reach(valve: Valve, runners: Sequence[Valve]) -> list[Valve]:
@@ -240,76 +277,6 @@ def rebased(fitter: Fitter, group: Group, valve: Valve, runners: Sequence[Valve]
     ]
     best = min((fitter.fit(each, problem) for each in there), key=by_cost)
     return min(valve, fitter.refined(best, problem) if group.has_stem else best, key=by_cost)
-
-
-def _screened(
-    fitter: Fitter,
-    candidate: Candidate,
-    group: Group,
-    valve: Valve,
-    own: Sequence[dict[str, float]],
-    suited: Sequence[dict[str, float]],
-    frictions: Bases,
-    lags: Bases,
-    held: float,
-) -> Valve:
-    """Return the valve with one more effect after a short refit of its group.
-
-    `own` are starts of the effect, `suited` those that the data show, as they do what holds the
-    stem, `held` [% of span].
-    """
-    there = replace(
-        valve,
-        effects=tuple(dict.fromkeys((*valve.effects, candidate.effect))),
-        candidates=(*valve.candidates, candidate),
-    )
-    problem = fitter.problem(group, there)
-    way = eased(problem)[0] if group.has_stem else problem
-    usual = {**candidate.neutral, **valve.values}
-    if len(own) > MOST_STARTS:
-        costs = [fitter.scan(there, [{**usual, **start}], way)[0].cost for start in own]
-        # of those that act at the same sample one is enough
-        own = [own[index] for index in np.unique(costs, return_index=True)[1][:FEWER_STARTS]]
-    own = [*own, *suited]
-
-    levels = [level for level in (usual['f_s'], held) if level > 0.0]
-
-    def balanced(start: Mapping[str, float]) -> Bases:
-        each = [candidate.balanced(level, usual, start) for level in levels]
-        # held as before, the stem may slip as before or further
-        further = [{**some[0], **share} for some in each if some for share in KINETIC]
-        return [*(one for some in each for one in some), *further] or [{}]
-
-    def around(bases: Bases) -> list[Bases]:
-        each = [balanced(start) for start in own]
-        return [
-            [{**usual, **base, **start} for base in (*some, *bases)]
-            for some, start in zip(each, own, strict=True)
-        ]
-
-    def best(starts: Sequence[Bases], way: Problem, count: int) -> list[Valve]:
-        each = [fitter.scan(there, some, way)[0] for some in starts]
-        best = sorted(each, key=by_cost)[:count]
-        # without the effect a stem may have been found that creeps instead of swinging
-        return [with_any_stem(fitter, one, way) for one in best] if group.has_stem else best
-
-    starts = around(frictions if group.has_stem else lags)
-    found = best(starts, problem, SCREENED if group.has_stem else SCREENED_IF_SMOOTH)
-    first = not group.unknowns_of(valve.candidates)  # beside another effect it takes too long
-    if group.has_stem and lags != [{}] and first:
-        anew = [some[1:] for some in around(lags)]
-        found += [fitter.fit(each, way, SHORT) for each in best(anew, way, 1)]
-    effect = CATALOGUE[candidate.effect]
-    # in a second look the stem is put to rest for all
-    led = RESTS in fitter.drive or (effect.laborious and not PUT_TO_REST.isdisjoint(fitter.drive))
-    # what tells on every slip
-    some = starts if effect.rugged or effect.imitated else starts[len(own) - len(suited) :]
-    if first and not led and some:
-        found += slip_by_slip(fitter, there, [one for each in some for one in each], problem)
-    elif way != problem:
-        found += [fitter.fit(each, way, SHORT) for each in best(starts, way, 1)]
-    steps = SHORT if group.has_stem else LONG
-    return min((fitter.fit(each, problem, steps) for each in found), key=by_cost)
 
 
 def _swings(fitter: Fitter, residual: Array) -> tuple[float, ...]:

@@ -13,8 +13,9 @@ from .race import race, rebased
 from .rung import judged, Rung
 from .stages import Candidate, Group
 
-RECONSIDERED = 5
-"""So many rivals of the first effect are tried again beside the second."""
+RECONSIDERED, NEAR = 5, 0.5
+"""So many rivals of the first effect are tried again beside the second, if they gained so much of
+what it did."""
 
 
 def reconsidered(
@@ -27,7 +28,9 @@ def reconsidered(
     """
     first, second = rungs[0], rungs[1]
     added = second.valve.candidates[-1]
-    near = sorted(first.gains, key=lambda name: -first.gains[name])[:RECONSIDERED]
+    least = NEAR * first.gains[first.effect]
+    rivals = [name for name in first.gains if first.gains[name] >= least]
+    near = sorted(rivals, key=lambda name: -first.gains[name])[:RECONSIDERED]
     names = {first.effect, *(name for name in near if not (lightly and CATALOGUE[name].laborious))}
     others = group.candidates({*base.effects, second.effect})
     candidates = [each for each in others if each.effect in names]
@@ -63,6 +66,10 @@ def reconsidered(
     if only := enough(second, later):
         return only
     before = leftover(fitter.residuals(later, group.signal))
+    # as found it was searched for longer than beside the second alone
+    *others_before, one, other = second.valve.candidates
+    swapped = replace(second.valve, candidates=(*others_before, other, one))
+    runners = sorted([*runners, swapped], key=by_cost)
     found = judged(fitter, group, later, before, runners)
     if found is None:
         return list(rungs)
