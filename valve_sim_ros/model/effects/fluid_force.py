@@ -58,7 +58,7 @@ EFFECT = Effect(
             'log',
             'Opening over which it would fall to 0 at its first rate',
             neutral=30.0,
-            starts=(20.0,),
+            starts=(20.0, 60.0),
         ),
         EffectParameter(
             'shape',
