@@ -158,7 +158,7 @@ def climb(
                 break
             told = _within(progress, step)
             # in the second look the stem is put to rest already, no valley of the base is missed
-            deeply = group.has_stem and some is candidates and not (rungs or again or hastily)
+            deeply = group.has_stem and some is candidates and not rungs and not again
             runners = race(
                 fitter,
                 group,

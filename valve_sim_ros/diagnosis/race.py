@@ -14,7 +14,7 @@ from scipy.signal import periodogram
 from ..model.effects import CATALOGUE
 from ..model.pipeline import Array
 from . import odds
-from .adequacy import leftover
+from .adequacy import Leftover, leftover
 from .alike import alike
 from .base_valve import find_base
 from .fitting import by_cost, FAINT, Fitter, Valve
@@ -122,8 +122,11 @@ def race(
     def refined(runner: Valve) -> Valve:
         return fitter.refined(runner, fitter.problem(group, runner))
 
+    def whole(runner: Valve) -> Leftover:
+        return leftover(fitter.residuals(runner, group.signal))
+
     def excess(runner: Valve) -> float:
-        return leftover(fitter.residuals(runner, group.signal)).excess
+        return whole(runner).excess
 
     def within(runners: Sequence[Valve], most: int) -> int:
         """Return how many are to be followed: none far behind one that explains nearly all."""
@@ -146,7 +149,8 @@ def race(
             others = [each for each in runners if each not in ahead]
             return sorted([*pool.map(how, ahead), *others], key=by_cost)
 
-        left = excess(valve)
+        before = whole(valve)
+        left = before.excess
         gap = valve.cost * left / (1.0 + left)
         waiting: list[Valve] = []
 
@@ -196,12 +200,14 @@ def race(
             imitated = [e for e in imitated if odds.look_alike(effect, e.effect)]
         runners = runners if raced else heat(runners, imitated)
         ended = sorted([*runners, *waiting], key=by_cost)
-        if hastily and ended and not nearly_all(ended[0]):
-            return alike(fitter, group, ended)
-        if deeply and runners:
+        closed = before.closed_by(whole(ended[0])) if ended else 0.0
+        hasty = hastily and ended and not nearly_all(ended[0])
+        if deeply and runners and (closed >= odds.MOSTLY or not hasty):
             ended = runners = _deepened(
                 fitter, group, valve, runners, [*quick, *imitated], progress
             )
+        if hasty and not nearly_all(ended[0]):
+            return alike(fitter, group, ended)
         best = ended[0] if ended else valve
         hidden = [e for e in slow if left < FAINT and odds.imitates(valve, e.effect)]
         if nearly_all(best):
