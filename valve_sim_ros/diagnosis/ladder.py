@@ -152,6 +152,7 @@ def climb(
         rest = chance_apart(now, before)
         if rest is not before:
             before = base_left = chance = rest
+        hastily = hastily and before.excess > odds.CLEAN  # little is looked at as a whole at once
         for step in range(MOST_EFFECTS):
             some = sought(before)
             if not some:
@@ -166,7 +167,7 @@ def climb(
                 some,
                 told,
                 deeply=deeply,
-                hastily=hastily and not rungs and before.excess > odds.CLEAN,
+                hastily=hastily and not rungs,
                 raced=raced if some is candidates and not rungs else (),
             )
             first = first or runners

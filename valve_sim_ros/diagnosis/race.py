@@ -187,22 +187,22 @@ def race(
         def nearly_all(best: Valve) -> bool:
             return excess(best) <= min(odds.CLEAN, NEARLY_ALL * left)
 
-        tiers: list[list[Candidate]] = [[], [], []]
-        for each in candidates:
-            tiers[_tier(each.effect)].append(each)
-        quick, imitated, slow = tiers
-        if raced and not promising(raced):
-            runners, waiting = [], [*raced]
+        quick, imitated, slow = (
+            [each for each in candidates if _tier(each.effect) == tier] for tier in range(3)
+        )
+        if raced:
+            runners, waiting = ([*raced], []) if promising(raced) else ([], [*raced])
         else:
-            runners = [*raced] or heat([], quick)
-        if runners and nearly_all(runners[0]):
-            effect = runners[0].candidates[-1].effect
-            imitated = [e for e in imitated if odds.look_alike(effect, e.effect)]
-        runners = runners if raced else heat(runners, imitated)
+            runners = heat([], quick)
+            if runners and nearly_all(runners[0]):
+                effect = runners[0].candidates[-1].effect
+                imitated = [e for e in imitated if odds.look_alike(effect, e.effect)]
+            runners = heat(runners, imitated)
         ended = sorted([*runners, *waiting], key=by_cost)
-        closed = before.closed_by(whole(ended[0])) if ended else 0.0
+        mostly = bool(ended) and before.closed_by(whole(ended[0])) >= odds.MOSTLY
         hasty = hastily and ended and not nearly_all(ended[0])
-        if deeply and runners and (closed >= odds.MOSTLY or not hasty):
+        # in haste what explains most was deepened already
+        if deeply and runners and (mostly if hasty else not (raced and mostly)):
             ended = runners = _deepened(
                 fitter, group, valve, runners, [*quick, *imitated], progress
             )
