@@ -15,7 +15,7 @@ from valve_sim_ros.diagnosis import race as racing
 from valve_sim_ros.diagnosis.adequacy import Leftover, leftover
 from valve_sim_ros.diagnosis.base_valve import find_base, starting_valve
 from valve_sim_ros.diagnosis.bench import Bench
-from valve_sim_ros.diagnosis.climbing import _let_go
+from valve_sim_ros.diagnosis.climbing import _let_go, _quickly
 from valve_sim_ros.diagnosis.coarse import COARSE, rounded
 from valve_sim_ros.diagnosis.fitting import by_cost, Fitter
 from valve_sim_ros.diagnosis.ladder import (
@@ -278,6 +278,38 @@ def test_a_bump_is_found_beside_another_effect_though_next_to_none_costs_least_a
     assert leftover(fitter.residuals(valve, 'x')).excess < 0.05
     assert valve.values['position_dependent_friction.centre'] == pytest.approx(46.0, abs=1.0)
     assert valve.values['friction_drift.rate'] == pytest.approx(2.0, rel=0.1)
+
+
+@pytest.mark.parametrize(
+    ('name', 'value', 'taken'),
+    [('travel_stops.upper', 62.0, True), ('sensor_drift.rate', 5.0, False)],
+)
+def test_what_a_caught_stem_shows_is_taken_if_it_explains_a_free_one(name, value, taken):
+    fitter, base = fitted(measured(**{'travel_stops.upper': 60.0}))
+    effect, parameter = name.split('.')
+    (added,) = [c for c in STEM.candidates() if c.effect == effect and c.names == (parameter,)]
+    values = {**base.values, **added.neutral, name: value}
+    named = replace(base, effects=(effect,), candidates=(added,), values=values)
+    before = leftover(fitter.residuals(base, 'x'))
+    unknown = Ladder(STEM, 'adequate', base, base, before, before, raced=(named,))
+    rung = Rung(effect, 'p2-x', {effect: 1e3}, before, left(0.0), 1.0, 0.9, (), named)
+    caught = replace(unknown, valve=named, after=left(0.0), rungs=(rung,))
+    climbs = []
+
+    def climbing(valve, candidates, *, hastily=False, **how):
+        climbs.append((fitter.drive, hastily, how))
+        return caught if CAUGHT in fitter.drive else unknown
+
+    found = _quickly(fitter, base, (added,), climbing, climbing, ())
+    hasty = [((), True, {}), ((CAUGHT,), True, {})]
+    if taken:
+        assert climbs == hasty
+        assert found.rungs == (rung,)
+        assert found.valve.values[name] == pytest.approx(60.0, abs=0.3)
+        assert found.after == leftover(fitter.residuals(found.valve, 'x'))
+    else:
+        assert climbs == [*hasty, ((), False, {'refit': False, 'raced': (named,)})]
+        assert found is unknown
 
 
 @pytest.mark.slow

@@ -77,7 +77,7 @@ def climb_all(
         )
         if stepped and group.has_stem:
             ladder = first(valve, candidates, hastily=True)
-        elif group.stages == ('p2-x',):
+        elif group.has_stem:
             ladder = _quickly(fitter, valve, candidates, first, again, stops)
         else:
             ladder = first(valve, candidates)
@@ -154,8 +154,8 @@ def _quickly(
     two effects each looks as if it explained nothing. So before these it is looked at caught.
     """
     hasty = climbing(valve, candidates, hastily=True)
-    unknown = concluded(hasty).outcome == 'unknown_effect'
-    if not unknown or not hasty.complete or hasty.before.excess <= odds.CLEAN:
+    named = concluded(hasty).outcome == 'missing_effect'
+    if named or not hasty.complete or hasty.before.excess <= odds.CLEAN:
         return hasty
     drive = fitter.drive
     fitter.drive = (*drive, CAUGHT)
