@@ -154,13 +154,15 @@ def _quickly(
     two effects each looks as if it explained nothing. So before these it is looked at caught.
     """
     hasty = climbing(valve, candidates, hastily=True)
-    named = concluded(hasty).outcome == 'missing_effect'
-    if named or not hasty.complete or hasty.before.excess <= odds.CLEAN:
+    outcome = concluded(hasty).outcome
+    if outcome == 'missing_effect' or not hasty.complete or hasty.before.excess <= odds.CLEAN:
         return hasty
-    drive = fitter.drive
-    fitter.drive = (*drive, CAUGHT)
-    found = concluded(again(hasty.base, candidates, hastily=True))
-    fitter.drive = drive
+    found = hasty
+    if outcome == 'unknown_effect':  # where little is left no slip hides much
+        drive = fitter.drive
+        fitter.drive = (*drive, CAUGHT)
+        found = concluded(again(hasty.base, candidates, hastily=True))
+        fitter.drive = drive
     if found.outcome == 'missing_effect':
         group, free = found.group, found.valve
         with suppress(*stops):

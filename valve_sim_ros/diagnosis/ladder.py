@@ -17,6 +17,7 @@ from .loosening import loosened
 from .race import race, rebased
 from .reconsidering import reconsidered
 from .rung import judged, Rung
+from .seen import rests_show
 from .stages import Candidate, Group
 from .stretch import HELD, MODELLED, PUT_TO_REST
 
@@ -121,7 +122,10 @@ def climb(
         if not worth(rest):
             return rest
         rest = on_time(fitter, group, valve)
-        return rest if rest.excess <= odds.SPOTLESS and rest.far < odds.MORE_FAR else left
+        by_chance = rest.excess <= odds.SPOTLESS and rest.far < odds.MORE_FAR
+        # a stem that is caught hides what stops it
+        by_chance = by_chance and not rests_show(fitter.bench, fitter.results(valve))
+        return rest if by_chance else left
 
     def sought(left: Leftover) -> Sequence[Candidate]:
         if left is not chance and worth(left):

@@ -227,6 +227,16 @@ def stops_seen(bench: Bench, results: Sequence[Array]) -> list[dict[str, float]]
     return [{**start, 'f_s': float(high - low) / 2.0} for start in starts]
 
 
+def rests_show(bench: Bench, results: Sequence[Array]) -> bool:
+    """Tell whether rests themselves show an effect: no chance makes slips depart from a law.
+
+    `results` as for `friction_seen`.
+    """
+    held = friction_seen(bench, results)[0]
+    shown = stops_seen(bench, results) or drift_seen(bench, results) or shaken_seen(bench, held)
+    return bool(shown)
+
+
 def _left(bench: Bench, stretch: Stretch) -> list[tuple[int, int, float]]:
     """Return each rest's first sample, 0 if unknown, the one that has left it, and its level."""
     x, near = stretch.measured['x'], LEAVES * bench.noise['x']
