@@ -89,6 +89,15 @@ def test_two_effects_must_explain_more_than_one(names, before, after, outcome):
     assert concluded(ladder_of('adequate', left(before), left(after), *names)).outcome == outcome
 
 
+@pytest.mark.parametrize(('width', 'outcome'), [(8.0, 'missing_effect'), (30.0, 'unknown_effect')])
+def test_an_effect_as_large_as_it_can_be_stands_for_another(width, outcome):
+    ladder = ladder_of('adequate', left(2.0), left(0.05), 'hysteresis')
+    added = next(c for c in groups(('p1',))[0].candidates() if 'command_width' in c.names)
+    values = {**ladder.valve.values, **added.neutral, 'hysteresis.command_width': width}
+    valve = replace(ladder.valve, candidates=(added,), values=values)
+    assert concluded(replace(ladder, valve=valve)).outcome == outcome
+
+
 def test_what_is_named_in_p1_must_explain_more():
     """A calibration in a slow loop passed for a supply limit; a loop may amplify noise."""
     names = ['positioner_loop']

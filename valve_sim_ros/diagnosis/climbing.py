@@ -154,24 +154,33 @@ def _quickly(
     two effects each looks as if it explained nothing. So before these it is looked at caught.
     """
     hasty = climbing(valve, candidates, hastily=True)
-    outcome = concluded(hasty).outcome
-    if outcome == 'missing_effect' or not hasty.complete or hasty.before.excess <= odds.CLEAN:
+    found = concluded(hasty)
+    if _final(found) or not hasty.complete or hasty.before.excess <= odds.CLEAN:
         return hasty
-    found = hasty
-    if outcome == 'unknown_effect':  # where little is left no slip hides much
+    if found.outcome == 'unknown_effect':  # where little is left no slip hides much
         drive = fitter.drive
         fitter.drive = (*drive, CAUGHT)
         found = concluded(again(hasty.base, candidates, hastily=True))
         fitter.drive = drive
-    if found.outcome == 'missing_effect':
+    if _final(found):
         group, free = found.group, found.valve
         with suppress(*stops):
             free = fitter.refined(free, fitter.problem(group, free))
         after = leftover(fitter.residuals(free, group.signal))
         names = [rung.effect for rung in found.rungs]
-        if odds.explained(group.signal, hasty.before, after, names):
-            return replace(found, base=hasty.base, valve=free, before=hasty.before, after=after)
-    return climbing(hasty.base, candidates, refit=False, raced=hasty.raced)
+        found = replace(found, base=hasty.base, valve=free, before=hasty.before, after=after)
+        if odds.explained(group.signal, hasty.before, after, names) and _final(found):
+            return found
+    whole = climbing(hasty.base, candidates, refit=False, raced=hasty.raced)
+    ended = whole.complete or concluded(whole).outcome == 'missing_effect'
+    return whole if ended else replace(hasty, complete=False)
+
+
+def _final(ladder: Ladder) -> bool:
+    """Tell whether names found in haste may stay: one that leaves more than noise may be wrong."""
+    alone = len(ladder.rungs) == 1
+    open_ = alone and not odds.nearly_all(ladder.before, ladder.after)
+    return ladder.outcome == 'missing_effect' and not open_
 
 
 def _patiently(fitter: Fitter, ladder: Ladder, guess: Rung) -> Ladder:

@@ -305,14 +305,17 @@ def _within(progress: Callable[[float], object], step: int) -> Callable[[float],
 
 
 def concluded(ladder: Ladder) -> Ladder:
-    """Return the ladder with its outcome: names only if together they explain the gap."""
+    """Return the ladder with its outcome: names only if together they explain the gap.
+
+    None of them may be as large as it can be.
+    """
     names = [rung.effect for rung in ladder.rungs]
     signal = ladder.group.signal
     # next to nothing is left to close where the base valve imitates it
     hidden = all(odds.imitates(ladder.base, name) for name in names)
     spotless = hidden and ladder.after.excess <= odds.SPOTLESS
     explained = odds.explained(signal, ladder.before, ladder.after, names, ladder.blurred)
-    if names and (spotless or explained):
+    if names and (spotless or explained) and not odds.at_limit(ladder.valve, names):
         return replace(ladder, outcome='missing_effect')
     # what does not explain the gap is not left in the valve either
     unknown = ladder.before.excess > odds.ADEQUATE[signal]

@@ -75,6 +75,11 @@ left is far more than noise; and where a large gap is closed by one that shifts 
 a wrong one straightens most of any line."""
 MOSTLY = 0.85
 """Part of the excess beside which the rest may be the fault of a law that is not quite right."""
+NEARLY_ALL = 0.02
+"""What the best may leave of the excess, and no more than noise, where effects that take long and
+do not look like it are not tried."""
+LIMIT = 1e-3
+"""How near the end of the range of a parameter is the end [part of the range]."""
 LEAST_FIRST, LEAST_AGAIN = 0.1, 0.35
 """A first effect that closes less than this part of the excess is not followed by a second; nor in
 a second look, where slips do not hide what is missing."""
@@ -148,6 +153,19 @@ def size(valve: Valve) -> float:
     return max(sizes, default=1.0)
 
 
+def at_limit(valve: Valve, names: Collection[str]) -> bool:
+    """Tell whether an effect of these was fitted as large as it can be: it stands for another."""
+    for candidate in valve.candidates:
+        for name in candidate.names if candidate.effect in names else ():
+            parameter = declared(candidate.effect, name)
+            value = valve.values[f'{candidate.effect}.{name}']
+            near = LIMIT * (parameter.upper - parameter.lower)
+            ends = {parameter.lower, parameter.upper} - {parameter.neutral}
+            if parameter.usual and any(abs(value - end) <= near for end in ends):
+                return True
+    return False
+
+
 def carried_on(left: Leftover, carried: float) -> bool:
     """Tell whether no more is left than the excess `carried` on from the signals before."""
     return carried > SPOTLESS and left.excess <= carried
@@ -211,6 +229,11 @@ def explained(
     else:
         least = EXPLAINED[signal] if len(names) == 1 else EXPLAINED_BY_TWO
     return before.closed_by(after) >= least
+
+
+def nearly_all(before: Leftover, after: Leftover) -> bool:
+    """Tell whether a gap is closed so far that effects that take long are not tried."""
+    return after.excess <= min(CLEAN, NEARLY_ALL * before.excess)
 
 
 def blurred(valve: Valve, noise: Mapping[str, float]) -> float:

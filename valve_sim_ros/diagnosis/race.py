@@ -42,10 +42,6 @@ FINISHERS, REFINED = 5, 2
 FAR_AHEAD, BEHIND = 0.2, 0.5
 """Where the best leaves no more than this part of the cost, or nothing but noise, runners short of
 more than a part of its gain are not followed."""
-NEARLY_ALL = 0.02
-"""What the best may leave of the excess, and no more than noise, where effects that take long and
-do not look like it are not tried."""
-
 PROMISING = 0.05
 """Part of the gap that a first refit must close for any to be followed before all have begun."""
 DEEPENED = 3
@@ -185,7 +181,7 @@ def race(
             return followed(refined, runners, near or REFINED, ahead)
 
         def nearly_all(best: Valve) -> bool:
-            return excess(best) <= min(odds.CLEAN, NEARLY_ALL * left)
+            return odds.nearly_all(before, whole(best))
 
         quick, imitated, slow = (
             [each for each in candidates if _tier(each.effect) == tier] for tier in range(3)
