@@ -110,7 +110,8 @@ def walk(
 ) -> Minimum:
     """Try steps along each axis, ever shorter, and keep what lowers the cost.
 
-    `cost` may stop counting at its second argument.
+    Steps that do so double: a state long forgotten may be far off, and hardly matters. `cost` may
+    stop counting at its second argument.
     """
     point, best = minimum
     for step in steps:
@@ -123,4 +124,5 @@ def walk(
                     if there >= best - 1e-9:
                         break
                     point, best = moved, there
+                    way *= 2.0
     return Minimum(point, best)
