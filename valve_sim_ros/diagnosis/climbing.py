@@ -14,7 +14,7 @@ from .adequacy import leftover
 from .base_valve import find_base
 from .coarse import rounded
 from .fitting import by_cost, FINE, Fitter, GENERATIONS, NARROW, PATIENT, Valve
-from .ladder import climb, concluded, excused, Ladder
+from .ladder import climb, concluded, excused, Ladder, MOST_EFFECTS
 from .rung import Rung
 from .stages import Candidate, Group
 from .stretch import CAUGHT, HELD, MODELLED, RESTS
@@ -157,23 +157,38 @@ def _quickly(
     found = concluded(hasty)
     if _final(found) or not hasty.complete or hasty.before.excess <= odds.CLEAN:
         return hasty
+    base = hasty.base
     if found.outcome == 'unknown_effect':  # where little is left no slip hides much
         drive = fitter.drive
-        fitter.drive = (*drive, CAUGHT)
-        found = concluded(again(hasty.base, candidates, hastily=True))
-        fitter.drive = drive
-    if _final(found):
-        group, free = found.group, found.valve
-        with suppress(*stops):
-            free = fitter.refined(free, fitter.problem(group, free))
-        after = leftover(fitter.residuals(free, group.signal))
-        names = [rung.effect for rung in found.rungs]
-        found = replace(found, base=hasty.base, valve=free, before=hasty.before, after=after)
-        if odds.explained(group.signal, hasty.before, after, names) and _final(found):
-            return found
+        caught = again
+        for most in range(1, MOST_EFFECTS + 1):
+            fitter.drive = (*drive, CAUGHT)
+            found = caught(base, candidates, hastily=True, most=most)
+            fitter.drive = drive
+            if free := _freed(fitter, hasty, concluded(found), stops):
+                return free
+            if not found.complete or len(found.rungs) < most:
+                break
+            base, caught = found.base, partial(again, refit=False, raced=found.raced)
     whole = climbing(hasty.base, candidates, refit=False, raced=hasty.raced)
     ended = whole.complete or concluded(whole).outcome == 'missing_effect'
     return whole if ended else replace(hasty, complete=False)
+
+
+def _freed(
+    fitter: Fitter, hasty: Ladder, caught: Ladder, stops: tuple[type[BaseException], ...]
+) -> Ladder | None:
+    """Return the ladder of a caught stem let go, if its names explain what a free one leaves."""
+    if caught.outcome != 'missing_effect':
+        return None
+    group, free = caught.group, caught.valve
+    with suppress(*stops):
+        free = fitter.refined(free, fitter.problem(group, free))
+    after = leftover(fitter.residuals(free, group.signal))
+    names = [rung.effect for rung in caught.rungs]
+    found = replace(caught, base=hasty.base, valve=free, before=hasty.before, after=after)
+    explained = odds.explained(group.signal, hasty.before, after, names)
+    return found if explained and _final(found) else None
 
 
 def _final(ladder: Ladder) -> bool:

@@ -63,6 +63,7 @@ def climb(
     carried: float = 0.0,
     hastily: bool = False,
     raced: Sequence[Valve] = (),
+    most: int = MOST_EFFECTS,
     progress: Callable[[float], object],
     stops: tuple[type[BaseException], ...],
 ) -> Ladder:
@@ -89,6 +90,8 @@ def climb(
         Leave out effects whose search takes long, but beside one that explains most.
     raced : sequence of Valve
         What a first race ended with when done hastily.
+    most : int
+        Most effects to add.
     progress : callable
         Called with the share done.
     stops : tuple of type
@@ -157,13 +160,14 @@ def climb(
         if rest is not before:
             before = base_left = chance = rest
         hastily = hastily and before.excess > odds.CLEAN  # little is looked at as a whole at once
-        for step in range(MOST_EFFECTS):
+        for step in range(most):
             some = sought(before)
             if not some:
                 break
             told = _within(progress, step)
-            # in the second look the stem is put to rest already, no valley of the base is missed
-            deeply = group.has_stem and some is candidates and not rungs and not again
+            # where the stem alone is put to rest, no valley of the base is missed
+            hidden = len(group.stages) > 1 or not again
+            deeply = group.has_stem and some is candidates and not rungs and hidden
             runners = race(
                 fitter,
                 group,
