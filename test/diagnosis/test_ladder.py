@@ -11,6 +11,7 @@ from scipy.signal import lfilter
 
 from valve_sim_ros import simulate
 from valve_sim_ros.diagnosis import diagnose, reconsidering
+from valve_sim_ros.diagnosis import ladder as climbing_up
 from valve_sim_ros.diagnosis import race as racing
 from valve_sim_ros.diagnosis.adequacy import Leftover, leftover
 from valve_sim_ros.diagnosis.base_valve import find_base, starting_valve
@@ -204,6 +205,22 @@ def test_little_excess_behind_a_named_effect_is_no_reason_for_another(named, fou
         fitter, STEM, base, lag, refit=False, named=named, progress=lambda share: None, stops=()
     )
     assert [rung.effect for rung in ladder.rungs] == found
+
+
+def test_stops_that_rests_show_are_not_laid_to_slips_that_hang_on_noise(monkeypatch):
+    levels = np.random.default_rng(5).uniform(20.0, 63.0, 60)
+    levels[4::16] = 81.0  # not enough to push a stem that was caught at the stop
+    u = np.concatenate([np.full(20, levels[0]), np.repeat(levels, 50)])
+    stem = {'f_s': 11.7, 'f_d': 4.7, 'effects': ['travel_stops'], 'travel_stops.upper': 71.4}
+    s = simulate(u, parameters={**STAGES, **stem})
+    rng = np.random.default_rng(1)
+    noisy = [each + 0.2 * rng.standard_normal(u.size) for each in (s.p1, s.p2, s.x)]
+    fitter, base = fitted(Recording(s.t, u, *noisy))
+    monkeypatch.setattr(climbing_up, 'on_time', lambda *_: left(0.05))
+    stops = [each for each in STEM.candidates() if each.names == ('upper',)]
+    ladder = climb(fitter, STEM, base, stops, refit=True, progress=lambda share: None, stops=())
+    assert [rung.effect for rung in ladder.rungs] == ['travel_stops']
+    assert ladder.valve.values['travel_stops.upper'] == pytest.approx(71.4, abs=0.1)
 
 
 def test_what_an_effect_named_before_explains_is_not_unknown():
