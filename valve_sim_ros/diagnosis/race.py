@@ -83,6 +83,8 @@ def race(
             'offsets': tuple(offset for _, offset in fitter.bench.grids_of_x),
             **calibration_seen(fitter.bench, results),
         }
+        if not seen['steps']:  # then x keeps to none
+            candidates = [each for each in candidates if each.effect != odds.COARSE]
         if not any(seen['offsets']):  # a grid through 0 needs none
             candidates = [each for each in candidates if not _shifted(each)]
         held = friction_seen(fitter.bench, results)[0]
@@ -159,7 +161,8 @@ def race(
         ) -> list[Valve]:
             """Return the runners with some more, which are refitted as far as they lead.
 
-            If none of them is promising they wait for those of the next heat.
+            If none of them is promising they wait for those of the next heat; in the last one they
+            are followed only where too much is left to be called adequate.
             """
             nonlocal waiting
             fresh = sorted([*waiting, *map(count, pool.map(begun, some))], key=by_cost)
@@ -169,6 +172,8 @@ def race(
             if not (last or promising(fresh)):
                 waiting = fresh
                 return ahead
+            if last and left <= odds.ADEQUATE[group.signal] and not promising(fresh):
+                return sorted([*ahead, *fresh], key=by_cost)
             for most, generations in ROUNDS if group.has_stem else ():
                 slowest = sorted(each.cost for each in (*ahead, *fresh))[:most][-1]
                 among = sum(each.cost <= slowest for each in fresh)
