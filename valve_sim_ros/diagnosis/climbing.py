@@ -193,9 +193,8 @@ def _freed(
 
 def _final(ladder: Ladder) -> bool:
     """Tell whether names found in haste may stay: one that leaves more than noise may be wrong."""
-    alone = len(ladder.rungs) == 1
-    open_ = alone and not odds.nearly_all(ladder.before, ladder.after)
-    return ladder.outcome == 'missing_effect' and not open_
+    enough = len(ladder.rungs) > 1 or odds.nearly_all(ladder.before, ladder.after)
+    return ladder.outcome == 'missing_effect' and enough
 
 
 def _patiently(fitter: Fitter, ladder: Ladder, guess: Rung) -> Ladder:

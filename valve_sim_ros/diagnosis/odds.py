@@ -160,9 +160,10 @@ def at_limit(valve: Valve, names: Collection[str]) -> bool:
             parameter = declared(candidate.effect, name)
             value = valve.values[f'{candidate.effect}.{name}']
             near = LIMIT * (parameter.upper - parameter.lower)
-            ends = {parameter.lower, parameter.upper} - {parameter.neutral}
-            if parameter.usual and any(abs(value - end) <= near for end in ends):
-                return True
+            for end in (parameter.lower, parameter.upper) if parameter.usual else ():
+                beyond = abs(end - parameter.neutral) > parameter.usual[1]
+                if beyond and abs(value - end) <= near:
+                    return True
     return False
 
 
