@@ -185,10 +185,9 @@ def _freed(
     with suppress(*stops):
         free = fitter.refined(free, fitter.problem(group, free))
     after = leftover(fitter.residuals(free, group.signal))
-    names = [rung.effect for rung in caught.rungs]
     found = replace(caught, base=hasty.base, valve=free, before=hasty.before, after=after)
-    explained = odds.explained(group.signal, hasty.before, after, names)
-    return found if explained and _final(found) else None
+    found = concluded(found)
+    return found if _final(found) else None
 
 
 def _final(ladder: Ladder) -> bool:

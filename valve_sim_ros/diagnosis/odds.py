@@ -155,16 +155,15 @@ def size(valve: Valve) -> float:
 
 def at_limit(valve: Valve, names: Collection[str]) -> bool:
     """Tell whether an effect of these was fitted as large as it can be: it stands for another."""
-    for candidate in valve.candidates:
-        for name in candidate.names if candidate.effect in names else ():
-            parameter = declared(candidate.effect, name)
-            value = valve.values[f'{candidate.effect}.{name}']
-            near = LIMIT * (parameter.upper - parameter.lower)
-            for end in (parameter.lower, parameter.upper) if parameter.usual else ():
-                beyond = abs(end - parameter.neutral) > parameter.usual[1]
-                if beyond and abs(value - end) <= near:
-                    return True
-    return False
+    found = [(c.effect, declared(c.effect, n)) for c in valve.candidates for n in c.names]
+    return any(
+        abs(end - parameter.neutral) > parameter.usual[1]
+        and abs(valve.values[f'{effect}.{parameter.name}'] - end)
+        <= LIMIT * (parameter.upper - parameter.lower)
+        for effect, parameter in found
+        if effect in names and parameter.usual
+        for end in (parameter.lower, parameter.upper)
+    )
 
 
 def carried_on(left: Leftover, carried: float) -> bool:
