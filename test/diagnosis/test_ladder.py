@@ -50,9 +50,9 @@ def ladder_of(outcome, before, after, *names):
     return Ladder(STEM, outcome, valve, valve, before, after, tuple(rungs))
 
 
-def measured(**effects):
+def measured(hold=50, **effects):
     levels = np.random.default_rng(5).uniform(10.0, 90.0, 30)
-    u = np.concatenate([np.zeros(20), np.repeat(levels, 50)])
+    u = np.concatenate([np.zeros(20), np.repeat(levels, hold)])
     used = list({name.split('.')[0] for name in effects if '.' in name})
     s = simulate(u, parameters={**VALVE, 'effects': used, **effects})
     rng = np.random.default_rng(1)
@@ -97,6 +97,21 @@ def test_an_effect_as_large_as_it_can_be_stands_for_another(width, outcome):
     values = {**ladder.valve.values, **added.neutral, 'hysteresis.command_width': width}
     valve = replace(ladder.valve, candidates=(added,), values=values)
     assert concluded(replace(ladder, valve=valve)).outcome == outcome
+
+
+@pytest.mark.parametrize('far', [9, 10])
+def test_many_far_errors_are_chance_in_slips_only(far):
+    little = left(0.1)._replace(far=far)
+    assert concluded(ladder_of('adequate', little, little)).outcome == 'adequate'
+    of_p1 = replace(ladder_of('adequate', little, little), group=groups(('p1', 'p2', 'x'))[0])
+    assert (concluded(of_p1).outcome == 'unknown_effect') == (far >= 10)
+
+
+def test_a_dead_time_that_is_no_candidate_is_unknown_where_p1_shows_it():
+    """It is off at one sample per step only, where jitter forgives most."""
+    record = measured(hold=170, **{'ip_dead_time.dead_time': 0.35})
+    found = diagnose(record, without=['ip_dead_time'])
+    assert found.verdict == 'unknown_effect'
 
 
 def test_what_is_named_in_p1_must_explain_more():

@@ -322,8 +322,7 @@ def concluded(ladder: Ladder) -> Ladder:
     if names and (spotless or explained) and not odds.at_limit(ladder.valve, names):
         return replace(ladder, outcome='missing_effect')
     # what does not explain the gap is not left in the valve either
-    unknown = ladder.before.excess > odds.ADEQUATE[signal]
-    outcome: Outcome = 'unknown_effect' if unknown else 'adequate'
+    outcome: Outcome = 'adequate' if odds.adequate(signal, ladder.before) else 'unknown_effect'
     return replace(ladder, outcome=outcome, valve=ladder.base, after=ladder.before, rungs=())
 
 

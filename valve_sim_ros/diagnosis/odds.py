@@ -166,6 +166,15 @@ def at_limit(valve: Valve, names: Collection[str]) -> bool:
     )
 
 
+def adequate(signal: str, left: Leftover) -> bool:
+    """Tell whether what is left of a signal may come of other solvers, of jitter and of chance.
+
+    p1 has no slips that could come at another moment: there many far errors are no chance.
+    """
+    far = signal == 'p1' and left.far >= MORE_FAR
+    return left.excess <= ADEQUATE[signal] and not far
+
+
 def carried_on(left: Leftover, carried: float) -> bool:
     """Tell whether no more is left than the excess `carried` on from the signals before."""
     return carried > SPOTLESS and left.excess <= carried
