@@ -172,7 +172,7 @@ def race(
             if not (last or promising(fresh)):
                 waiting = fresh
                 return ahead
-            if last and left <= odds.ADEQUATE[group.signal] and not promising(fresh):
+            if last and odds.adequate(group.signal, before) and not promising(fresh):
                 return sorted([*ahead, *fresh], key=by_cost)
             for most, generations in ROUNDS if group.has_stem else ():
                 slowest = sorted(each.cost for each in (*ahead, *fresh))[:most][-1]
