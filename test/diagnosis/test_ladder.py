@@ -29,6 +29,7 @@ from valve_sim_ros.diagnosis.odds import blurred, explained, imitates, strong, s
 from valve_sim_ros.diagnosis.race import race
 from valve_sim_ros.diagnosis.reconsidering import reconsidered
 from valve_sim_ros.diagnosis.rung import judged, Rung
+from valve_sim_ros.diagnosis.single_slips import slip_by_slip
 from valve_sim_ros.diagnosis.stages import groups
 from valve_sim_ros.diagnosis.stretch import CAUGHT
 from valve_sim_ros.recordings.recording import Recording
@@ -371,6 +372,55 @@ def test_a_train_of_slips_is_put_together_from_single_slips():
     assert after < 0.05 * before
     assert best.values['f_s'] == pytest.approx(9.5, rel=0.01)
     assert best.values['stribeck_friction.velocity'] == pytest.approx(3.7, rel=0.2)
+
+
+@pytest.mark.slow
+def test_a_friction_that_falls_with_speed_is_found_behind_a_stem_of_another_kind():
+    """A base valve that creeps or swings imitates it, and lies far from the true stem."""
+    rng = np.random.default_rng(1)
+    u = np.interp(np.arange(1500) * 0.2, np.linspace(0.0, 300.0, 15), rng.uniform(10.0, 90.0, 15))
+    u[:50] = u[0]
+    stem = {'f_s': 6.76, 'f_d': 4.43, 'a_1': 1451.0, 'a_2': 145.4}
+    effect = {'effects': ['stribeck_friction'], 'stribeck_friction.velocity': 7.5}
+    s = simulate(u, parameters={**STAGES, **stem, **effect})
+    noisy = [each + 0.15 * rng.standard_normal(u.size) for each in (s.p1, s.p2, s.x)]
+    fitter, base = fitted(Recording(s.t, u, *noisy))
+    base = find_base(fitter, STEM, base, ())
+    assert base.values['a_1/a_2'] > 30.0
+    plain, _ = [c for c in STEM.candidates() if c.effect == 'stribeck_friction']
+    start = {**base.values, **plain.neutral, 'stribeck_friction.velocity': 4.0}
+    there = replace(base, effects=(plain.effect,), candidates=(plain,), values=start)
+    problem = fitter.problem(STEM, there)
+    found = min(slip_by_slip(fitter, there, [start], problem, held=6.8), key=by_cost)
+    before, after = (leftover(fitter.residuals(each, 'x')) for each in (base, found))
+    assert before.closed_by(after) > 0.97
+    assert found.values['a_1/a_2'] == pytest.approx(10.0, rel=0.2)
+    assert found.values['stribeck_friction.velocity'] == pytest.approx(7.5, rel=0.1)
+
+
+@pytest.mark.parametrize(('left', 'widened'), [(0.001, False), (0.3, True)])
+def test_a_law_with_one_more_parameter_is_tried_where_the_plain_one_leaves_something(
+    left, widened, monkeypatch
+):
+    fitter, base = fitted(measured(**{'friction_drift.rate': 3.0}))
+    tried = []
+
+    def screened(fitter, candidate, *rest):
+        tried.append(candidate.names)
+        return replace(base, cost=left * base.cost, candidates=(candidate,))
+
+    monkeypatch.setattr(racing, 'screened', screened)
+    for how in ('evolve', 'fit', 'refined'):
+        monkeypatch.setattr(Fitter, how, lambda self, valve, *rest: valve)
+    noise = np.random.default_rng(0).standard_normal(2000)
+
+    def residuals(self, valve, *rest):
+        factor = 1.0 if left < 0.1 and valve.candidates else np.repeat([1.0, 4.0], 1000)
+        return noise * factor
+
+    monkeypatch.setattr(Fitter, 'residuals', residuals)
+    race(fitter, STEM, base, [c for c in STEM.candidates() if c.effect == 'stribeck_friction'])
+    assert tried == [('velocity',), ('velocity', 'exponent')][: 1 + widened]
 
 
 def test_a_laborious_effect_does_not_run_where_another_explains_the_signal(monkeypatch):

@@ -33,7 +33,7 @@ from .readings import (
     straightened,
     wild,
 )
-from .stretch import CAUGHT, FINELY, Grid, HELD, MODELLED, ON_TIME, RESTS, Stretch
+from .stretch import CAUGHT, FINELY, Grid, HELD, MODELLED, ON_TIME, RESTS, SOON, Stretch
 
 LEAST_PART = 20
 """A part of no more samples between two gaps tells nothing."""
@@ -55,7 +55,7 @@ STEP = 4.0
 """Where p1 moves by more within a sample it steps [noise]."""
 CREEPS = 3.0
 """A stem that drifts by more before it has surely moved moves when the record begins [noise]."""
-APART = 6.0
+APART = {SOON: 3.0, CAUGHT: 6.0, ON_TIME: 6.0}
 """A stem is caught where it is further than this from where it should rest [noise]."""
 
 SWINGS = 0.7
@@ -194,7 +194,7 @@ class Bench:
             theta[STUCK] = IMMENSE
         outputs = np.empty((BESIDE + 1, grid.u.size))
         slack = min(SLACK, SLACK_SHARE * values['f_s'])
-        if {RESTS, CAUGHT} & {*drive}:
+        if {RESTS, SOON, CAUGHT} & {*drive}:
             slack *= EASE
         score = scored(bool(effects))(
             grid.u,
@@ -210,7 +210,7 @@ class Bench:
             grid.targets.get(signal, grid.nothing),
             grid.scales.get(signal, grid.nothing),
             slack,
-            APART * self.noise['x'] if {CAUGHT, ON_TIME} & {*drive} else 0.0,
+            max((APART[how] * self.noise['x'] for how in drive if how in APART), default=0.0),
             bound,
         )
         return outputs, grid, score

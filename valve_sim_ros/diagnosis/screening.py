@@ -101,7 +101,8 @@ def screened(
     some = starts if effect.rugged or effect.imitated else starts[len(own) - len(suited) :]
     odd = odds.imitates(valve, candidate.effect)
     if some and (odd or (first and not led)):
-        found += slip_by_slip(fitter, there, [one for each in some for one in each], problem)
+        each = [one for each in some for one in each]
+        found += slip_by_slip(fitter, there, each, problem, held)
     elif way != problem:
         found += [fitter.fit(each, way, SHORT) for each in best(starts, way, 1)]
     steps = SHORT if group.has_stem else LONG

@@ -16,11 +16,12 @@ from .interleaving import interleaved, Rows, spread
 from .pushing import finer
 
 KEPT_GRIDS = 60
-RESTS, CAUGHT, ON_TIME, HELD = 'x', 'x caught', 'x caught on time', 'x held'
+RESTS, SOON, CAUGHT, ON_TIME = 'x', 'x caught soon', 'x caught', 'x caught on time'
+HELD = 'x held'
 """Drives by which a stem is put where it was measured: whenever that rests; only where it is far
 from there, which leaves a right valve alone; the same, while slips must come at the right moment;
 and at every moment."""
-PUT_TO_REST = {RESTS, CAUGHT, ON_TIME}
+PUT_TO_REST = {RESTS, SOON, CAUGHT, ON_TIME}
 MODELLED, FINELY = 'p2 modelled', 'finely'
 """Drives by which the chamber receives what leads p2 where the effects found before it lead it:
 they need not run again with every stem; and by which a held stem moves between samples as well."""
