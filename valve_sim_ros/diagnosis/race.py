@@ -216,7 +216,13 @@ def race(
             slow = [e for e in slow if e in hidden or odds.look_alike(effect, e.effect)]
         elif ended and left < (odds.CLEAN if valve.candidates else FAINT):
             slow = [e for e in slow if e in hidden or not CATALOGUE[e.effect].laborious]
-        runners = heat(runners, slow, last=True)
+        # a law with one more parameter is tried only where the plain one leaves something
+        further = [e for e in slow if group.has_stem and _extends(e, slow)]
+        runners = heat(runners, [e for e in slow if e not in further], last=not further)
+        if runners:
+            plain = runners[0].candidates[-1] in slow and excess(runners[0]) <= odds.SPOTLESS
+            further = [] if plain or nearly_all(runners[0]) else further
+        runners = heat(runners, further, last=True)
         if deeply:
             runners = _deepened(fitter, group, valve, runners, slow, progress)
     return alike(fitter, group, runners)
@@ -225,6 +231,12 @@ def race(
 def _shifted(candidate: Candidate) -> bool:
     """Tell whether it is a coarse sensor whose grid does not go through 0."""
     return candidate.effect == odds.COARSE and 'offset' in candidate.names
+
+
+def _extends(candidate: Candidate, others: Sequence[Candidate]) -> bool:
+    """Tell whether it is another one of the same effect with more parameters."""
+    same = [each for each in others if each.effect == candidate.effect]
+    return any({*each.names} < {*candidate.names} for each in same)
 
 
 def _tier(effect: str) -> int:
