@@ -111,6 +111,8 @@ def climb(
     def worth(left: Leftover) -> bool:
         if odds.carried_on(left, carried):
             return False
+        if rungs and CATALOGUE[rungs[0].effect].rugged:  # far errors come with every detail missed
+            return left.excess >= odds.CLEAN
         if rungs:
             return odds.unfinished(left, odds.MORE_EXCESS)
         if named and not odds.unfinished(left, odds.CLEAN):
@@ -211,7 +213,8 @@ def climb(
                 rungs, rung = both[:-1], both[-1]
             elif not explained(rung):
                 guess = rung
-                if rung.closed < (odds.LEAST_AGAIN if again else odds.LEAST_FIRST):
+                little = again or odds.adequate(group.signal, base_left)
+                if rung.closed < (odds.LEAST_AGAIN if little else odds.LEAST_FIRST):
                     break
                 if CATALOGUE[rung.effect].rugged and not again:
                     break

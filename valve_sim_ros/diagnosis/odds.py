@@ -82,7 +82,8 @@ LIMIT = 1e-3
 """How near the end of the range of a parameter is the end [part of the range]."""
 LEAST_FIRST, LEAST_AGAIN = 0.1, 0.35
 """A first effect that closes less than this part of the excess is not followed by a second; nor in
-a second look, where slips do not hide what is missing."""
+a second look, where slips do not hide what is missing, and where what the base valve leaves counts
+as adequate."""
 LEAST_LED = 0.7
 """What a name must close of an x whose stem is put to rest, to be tried on a free one."""
 TWIN_GAIN, TWIN_SHARE, KNOWN_TWIN_SHARE = 12.0, 0.003, 0.02
