@@ -32,7 +32,6 @@ from valve_sim_ros.diagnosis.rung import judged, Rung
 from valve_sim_ros.diagnosis.single_slips import slip_by_slip
 from valve_sim_ros.diagnosis.stages import groups
 from valve_sim_ros.diagnosis.stretch import CAUGHT
-from valve_sim_ros.identification.watch import Stop
 from valve_sim_ros.recordings.recording import Recording
 
 STEM = groups(('p1', 'p2', 'x'))[-1]
@@ -423,22 +422,6 @@ def test_a_law_with_one_more_parameter_is_tried_where_the_plain_one_leaves_somet
     both = [c for c in STEM.candidates() if c.effect == 'stribeck_friction']
     race(fitter, STEM, base, both)
     assert tried == [('velocity',), ('velocity', 'exponent')][: 1 + widened]
-
-
-def test_a_law_found_before_the_end_of_the_time_is_not_lost(monkeypatch):
-    fitter, base = fitted(measured(**{'friction_drift.rate': 3.0}))
-    plain, wider = [c for c in STEM.candidates() if c.effect == 'stribeck_friction']
-
-    def screened(fitter, candidate, *rest):
-        if candidate == wider:
-            raise Stop
-        return replace(base, cost=0.5 * base.cost, candidates=(candidate,))
-
-    monkeypatch.setattr(racing, 'screened', screened)
-    for how in ('evolve', 'fit', 'refined'):
-        monkeypatch.setattr(Fitter, how, lambda self, valve, *rest: valve)
-    (found,) = race(fitter, STEM, base, [plain, wider])
-    assert found.candidates == (plain,)
 
 
 def test_a_laborious_effect_does_not_run_where_another_explains_the_signal(monkeypatch):

@@ -7,7 +7,6 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Literal
 
-from ..identification.watch import Stop
 from ..model.effects import CATALOGUE
 from . import odds
 from .adequacy import but_one_slip, Leftover, leftover
@@ -182,8 +181,7 @@ def climb(
                 raced=raced if some is candidates and not rungs else (),
             )
             first = first or runners
-            with suppress(Stop):  # once stopped, what the race found is judged as it is
-                now = rebased(fitter, group, now, runners[:5])
+            now = rebased(fitter, group, now, runners[:5])
             before = leftover(fitter.residuals(now, group.signal))
             if not rungs:
                 base, base_left = now, before

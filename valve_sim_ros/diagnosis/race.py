@@ -4,7 +4,6 @@
 
 from collections.abc import Callable, Collection, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import suppress
 from dataclasses import replace
 from functools import partial
 import os
@@ -12,7 +11,6 @@ import os
 import numpy as np
 from scipy.signal import periodogram
 
-from ..identification.watch import Stop
 from ..model.effects import CATALOGUE
 from ..model.pipeline import Array
 from . import odds
@@ -224,8 +222,7 @@ def race(
         if runners:
             plain = runners[0].candidates[-1] in slow and excess(runners[0]) <= odds.SPOTLESS
             further = [] if plain or nearly_all(runners[0]) else further
-        with suppress(Stop):  # what the plain law explains must not be lost
-            runners = heat(runners, further, last=True)
+        runners = heat(runners, further, last=True)
         if deeply:
             runners = _deepened(fitter, group, valve, runners, slow, progress)
     return alike(fitter, group, runners)
