@@ -55,10 +55,14 @@ def measured(hold=50, **effects):
     levels = np.random.default_rng(5).uniform(10.0, 90.0, 30)
     u = np.concatenate([np.zeros(20), np.repeat(levels, hold)])
     used = list({name.split('.')[0] for name in effects if '.' in name})
-    s = simulate(u, parameters={**VALVE, 'effects': used, **effects})
-    rng = np.random.default_rng(1)
-    noisy = [each + 0.2 * rng.standard_normal(u.size) for each in (s.p1, s.p2, s.x)]
-    return Recording(s.t, u, *noisy)
+    return noisy(u, 0.2, np.random.default_rng(1), **{**VALVE, 'effects': used, **effects})
+
+
+def noisy(u, noise, rng, **parameters):
+    """Return a record of a valve, its stages as usual but for the parameters."""
+    s = simulate(u, parameters={**STAGES, **parameters})
+    each = (signal + noise * rng.standard_normal(u.size) for signal in (s.p1, s.p2, s.x))
+    return Recording(s.t, u, *each)
 
 
 def fitted(record):
@@ -307,10 +311,8 @@ def test_a_bump_is_found_beside_another_effect_though_next_to_none_costs_least_a
     bump = {'height': 0.4, 'centre': 46.0, 'width': 10.0}
     bump = {f'position_dependent_friction.{name}': value for name, value in bump.items()}
     names = ['friction_drift', 'position_dependent_friction']
-    stem = {**STAGES, 'f_s': 6.0, 'f_d': 2.7, 'effects': names, 'friction_drift.rate': 2.0, **bump}
-    s = simulate(u, parameters=stem)
-    noisy = [each + 0.2 * rng.standard_normal(u.size) for each in (s.p1, s.p2, s.x)]
-    fitter, valve = fitted(Recording(s.t, u, *noisy))
+    stem = {'f_s': 6.0, 'f_d': 2.7, 'effects': names, 'friction_drift.rate': 2.0, **bump}
+    fitter, valve = fitted(noisy(u, 0.2, rng, **stem))
     valve = find_base(fitter, STEM, valve, ())
     fitter.drive = (CAUGHT,)
     valve = replace(valve, cost=fitter.score(valve, 'x', fitter.drive))
@@ -363,9 +365,7 @@ def test_a_train_of_slips_is_put_together_from_single_slips():
     u[:50] = u[0]
     stem = {'f_s': 9.5, 'f_d': 6.6, 'a_1': 2340.0, 'a_2': 218.0}
     effect = {'effects': ['stribeck_friction'], 'stribeck_friction.velocity': 3.7}
-    s = simulate(u, parameters={**STAGES, **stem, **effect})
-    noisy = [each + 0.2 * rng.standard_normal(u.size) for each in (s.p1, s.p2, s.x)]
-    fitter, base = fitted(Recording(s.t, u, *noisy))
+    fitter, base = fitted(noisy(u, 0.2, rng, **stem, **effect))
     some = [c for c in STEM.candidates() if c.effect == 'stribeck_friction']
     best = race(fitter, STEM, base, some)[0]
     before, after = (leftover(fitter.residuals(each, 'x')).excess for each in (base, best))
@@ -382,9 +382,7 @@ def test_a_friction_that_falls_with_speed_is_found_behind_a_stem_of_another_kind
     u[:50] = u[0]
     stem = {'f_s': 6.76, 'f_d': 4.43, 'a_1': 1451.0, 'a_2': 145.4}
     effect = {'effects': ['stribeck_friction'], 'stribeck_friction.velocity': 7.5}
-    s = simulate(u, parameters={**STAGES, **stem, **effect})
-    noisy = [each + 0.15 * rng.standard_normal(u.size) for each in (s.p1, s.p2, s.x)]
-    fitter, base = fitted(Recording(s.t, u, *noisy))
+    fitter, base = fitted(noisy(u, 0.15, rng, **stem, **effect))
     base = find_base(fitter, STEM, base, ())
     assert base.values['a_1/a_2'] > 30.0
     plain, _ = [c for c in STEM.candidates() if c.effect == 'stribeck_friction']
@@ -419,8 +417,7 @@ def test_a_law_with_one_more_parameter_is_tried_where_the_plain_one_leaves_somet
         return noise * factor
 
     monkeypatch.setattr(Fitter, 'residuals', residuals)
-    both = [c for c in STEM.candidates() if c.effect == 'stribeck_friction']
-    race(fitter, STEM, base, both)
+    race(fitter, STEM, base, [c for c in STEM.candidates() if c.effect == 'stribeck_friction'])
     assert tried == [('velocity',), ('velocity', 'exponent')][: 1 + widened]
 
 

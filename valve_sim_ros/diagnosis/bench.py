@@ -56,7 +56,7 @@ STEP = 4.0
 CREEPS = 3.0
 """A stem that drifts by more before it has surely moved moves when the record begins [noise]."""
 APART = {SOON: 3.0, CAUGHT: 6.0, ON_TIME: 6.0}
-"""A stem is caught where it is further than this from where it should rest [noise]."""
+"""By drive: a stem is caught where it is further than this from where it should rest [noise]."""
 
 SWINGS = 0.7
 """What a signal does from sample to sample is a swing if there is less between the lines of its

@@ -18,9 +18,9 @@ from .pushing import finer
 KEPT_GRIDS = 60
 RESTS, SOON, CAUGHT, ON_TIME = 'x', 'x caught soon', 'x caught', 'x caught on time'
 HELD = 'x held'
-"""Drives by which a stem is put where it was measured: whenever that rests; only where it is far
-from there, which leaves a right valve alone; the same, while slips must come at the right moment;
-and at every moment."""
+"""Drives by which a stem is put where it was measured: whenever that rests; only where it is half
+a slip or so from there; only where it is far from there, which leaves a right valve alone; the
+same, while slips must come at the right moment; and at every moment."""
 PUT_TO_REST = {RESTS, SOON, CAUGHT, ON_TIME}
 MODELLED, FINELY = 'p2 modelled', 'finely'
 """Drives by which the chamber receives what leads p2 where the effects found before it lead it:
