@@ -3,73 +3,39 @@
 """Elastic motion of the stem below breakaway: bristles that slide (LuGre) or that break."""
 
 import math
-from typing import Any, NamedTuple
+from typing import Any
 
 from numba import njit
 
+from ..bristles import Bent, Bristles, through
 from ..declarations import Effect, EffectParameter
 from ..slip import forced_gain, stem_poles
 from ..state import Motion, moved
-from ..stem import Friction, Stem, through_events, visible
+from ..stem import Stem, through_events, visible
 
-STIFFEST = 200.0
-"""Bristles are not stiffer than this, relative to the spring: their travel is then not seen."""
-STEP, STABLE = 0.008, 2.0
-"""Longest step [s], and longest step times the fastest rate."""
-SLOW, FAST = 1e-3, 6.0
-"""Speeds below which all of f_s - f_d is left, and beyond which nothing [v_s]."""
-
-
-class Bristles(NamedTuple):
-    """Constants of the stem on its bristles.
-
-    k/m [1/s^2], F_v/m [1/s], stiffness and damping [s] of the bristles relative to the spring, v_s
-    [%/s], share of f_d up to which they do not slide, and friction.
-    """
-
-    inertia: float
-    damping: float
-    stiffness: float
-    bristle_damping: float
-    drop_speed: float
-    elastic: float
-    friction: Friction
+STIFFEST, MOST_ELASTIC = 200.0, 0.95
+"""Bristles are not stiffer than this, relative to the spring: their travel is then not seen; and
+they slide before they break."""
 
 
 @njit
 def motion(value: Any, state: Any, p: Any, memory: Any, dt: float) -> Motion:
-    """Replace the step of the stem by short ones with bristles (classical Runge-Kutta)."""
+    """Replace the step of the stem by one on bristles."""
     if p[0] <= 0.0:
         return held(value, state, p[2], dt) if p[2] > 0.0 and state.direction == 0.0 else value
-    friction, theta = value.friction, value.theta
+    friction, theta, target = value.friction, value.theta, value.target
     stiffness = min(1.0 / p[0], STIFFEST)
     inertia, damping = visible(theta.a_1, theta.a_2)
     omega = math.sqrt(inertia * stiffness)
-    b = Bristles(inertia, damping, stiffness, 2.0 * stiffness / omega, p[1], p[3], friction)
-    x, v, z = state.x, state.v, memory[0]
+    elastic = min(p[3], MOST_ELASTIC)
+    b = Bristles(inertia, damping, stiffness, 2.0 * stiffness / omega, p[1], elastic, friction)
+    z = memory[0]
     if math.isnan(z):
-        force = value.target + value.excess - friction.stiffness * x
+        force = target + value.excess - friction.stiffness * state.x
         z = min(max(force, -friction.static_down), friction.static_up) / stiffness
-    count = math.ceil(dt / min(STEP, STABLE / (damping + 2.0 * omega)))
-    h = dt / max(count, 1)
-    half_decay = math.exp(-0.5 * value.rate * h)
-    now = value.excess
-    for _ in range(count):
-        middle = now * half_decay
-        end = middle * half_decay
-        a1, z1 = rates(value.target + now, x, v, z, b)
-        v2 = v + 0.5 * h * a1
-        a2, z2 = rates(value.target + middle, x + 0.5 * h * v, v2, z + 0.5 * h * z1, b)
-        v3 = v + 0.5 * h * a2
-        a3, z3 = rates(value.target + middle, x + 0.5 * h * v2, v3, z + 0.5 * h * z2, b)
-        v4 = v + h * a3
-        a4, z4 = rates(value.target + end, x + h * v3, v4, z + h * z3, b)
-        x += h / 6.0 * (v + 2.0 * (v2 + v3) + v4)
-        v += h / 6.0 * (a1 + 2.0 * (a2 + a3) + a4)
-        z += h / 6.0 * (z1 + 2.0 * (z2 + z3) + z4)
-        now = end
-    memory[0] = z
-    return moved(value, Stem(x, v, 0.0, False), value.p2)
+    bent = through(Bent(state.x, state.v, z), target, value.excess, value.rate, dt, b, memory)
+    memory[0] = bent.z
+    return moved(value, Stem(bent.x, bent.v, 0.0, False), value.p2)
 
 
 @njit
@@ -111,35 +77,6 @@ def held(value: Any, state: Any, compliance: float, dt: float) -> Motion:
         math.exp(-rate * left),
     )
     return moved(value, stem, value.p2)
-
-
-@njit(forceinline=True)
-def sliding(z: float, v: float, level: float, dynamic: float, b: Bristles) -> float:
-    """Return the share of the bristles that slide: all, or none while they are bent but little."""
-    if b.elastic <= 0.0:
-        return 1.0
-    first, last = b.elastic * dynamic, level
-    force = b.stiffness * abs(z)
-    if z * v <= 0.0 or force <= first:
-        return 0.0
-    return (
-        0.5 - 0.5 * math.cos(math.pi * (force - first) / (last - first)) if force < last else 1.0
-    )
-
-
-@njit(forceinline=True)
-def rates(p2: float, x: float, v: float, z: float, b: Bristles) -> tuple[float, float]:
-    """Return the rates of the stem's speed [%/s^2] and of the bristles [%/s]."""
-    f = b.friction
-    static, dynamic = (f.static_up, f.dynamic_up) if v >= 0.0 else (f.static_down, f.dynamic_down)
-    ratio = v / b.drop_speed
-    level = dynamic + 1e-6
-    if abs(ratio) < FAST:
-        fall = math.exp(-ratio * ratio) if abs(ratio) > SLOW else 1.0
-        level += (static - dynamic) * fall
-    slope = v - b.stiffness * abs(v) * z / level * sliding(z, v, level, dynamic, b)
-    force = p2 - f.stiffness * x - b.stiffness * z - b.bristle_damping * slope
-    return b.inertia * force - b.damping * v, slope
 
 
 EFFECT = Effect(
@@ -190,7 +127,7 @@ EFFECT = Effect(
             '-',
             0.0,
             0.0,
-            0.95,
+            MOST_ELASTIC,
             'linear',
             'Share of f_d up to which the bristles bend without sliding',
             neutral=0.0,
@@ -199,7 +136,7 @@ EFFECT = Effect(
         ),
     ),
     slots={'motion_slot': motion},
-    memory=1,
+    memory=2,
     order=-10,
     explanation='The packing gives way elastically before the stem breaks away.',
     symptom='Micro-motion below f_s, minor loops, and no clean stick.',
