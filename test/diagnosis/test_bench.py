@@ -269,15 +269,19 @@ def test_a_first_slip_that_was_seen_on_its_way_goes_on():
     assert np.nanmax(np.abs(off[slip + 10 :])) < 6.0  # where p2 creeps, a slip may come late
 
 
-@pytest.mark.parametrize('first', [200, 300])
-def test_a_stem_that_moves_when_the_record_begins_moves_on(first):
+@pytest.mark.parametrize('calibration', [(0.0, 1.0), (-1.0, 0.85)])
+@pytest.mark.parametrize(('first', 'T_g2'), [(200, 60.0), (300, 60.0), (120, 30.0)])
+def test_a_stem_that_moves_when_the_record_begins_moves_on(first, T_g2, calibration):
     levels = ((50, 70.0), (500, 20.0), (700, 90.0))
-    slow, truth, record = slow_valve(levels, 0.2, T_g1=12.0, T_g2=60.0, f_s=10.0)
+    slow, truth, record = slow_valve(levels, 0.2, T_g1=12.0, T_g2=T_g2, f_s=10.0)
+    zero, span = calibration
+    slow |= {'sensor_calibration.zero': zero, 'sensor_calibration.span': span}
+    truth, record = (replace(each, x=zero + span * each.x) for each in (truth, record))
     bench = Bench([record.slice(0.2 * first, np.inf)])
     speed = (truth.x[first + 20] - truth.x[first]) / 4.0
     assert bench.stretches[0].speed == pytest.approx(speed, rel=0.15)
     start = {f'{name}_0': truth.output(name)[first] for name in ('p1', 'p2', 'x')}
-    result = bench.run(complete({**slow, **start}))
+    result = bench.run(complete({**slow, **start}), ['sensor_calibration'])
     assert np.nanmax(np.abs(bench.residual(result, 'x'))) < 6.0
 
 

@@ -10,6 +10,8 @@ import numpy as np
 
 from ..identification.stretches import noise_of
 from ..model.composition import compose
+from ..model.effects.sensor_calibration import EFFECT as CALIBRATION
+from ..model.effects.sensor_calibration import place
 from ..model.kernels import scored
 from ..model.parameters import DELTA
 from ..model.pipeline import Array
@@ -25,9 +27,9 @@ from .readings import (
     filled,
     foreseen,
     grids_kept,
+    pace,
     resolution_of,
     REST,
-    slope_of,
     smooth,
     still,
     straightened,
@@ -53,8 +55,6 @@ part of the friction: a stem that is nearly free always begins to slip; and how 
 where the stem is put to rest: the moment of each slip says little there."""
 STEP = 4.0
 """Where p1 moves by more within a sample it steps [noise]."""
-CREEPS = 3.0
-"""A stem that drifts by more before it has surely moved moves when the record begins [noise]."""
 APART = {SOON: 3.0, CAUGHT: 6.0, ON_TIME: 6.0}
 """By drive: a stem is caught where it is further than this from where it should rest [noise]."""
 
@@ -107,11 +107,9 @@ class Bench:
                 stretch.held = straightened(whole, stretch.u, noise)
                 stretch.rests = np.where(rests, smoothed, np.nan)
                 departed = self._travelled(stretch.held, 0.0) or samples.size
-                slope = slope_of(whole[:departed])
-                if abs(slope) * departed > CREEPS * noise:
-                    # one that creeps seems to rest
-                    stretch.speed = slope / float(np.median(np.diff(stretch.time)))
-                else:
+                period = float(np.median(np.diff(stretch.time)))
+                stretch.speed = pace(whole, departed, noise) / period
+                if not stretch.speed:  # one that creeps seems to rest
                     # a first slip that was seen on its way must not be put to rest there
                     seen = samples < departed - REST
                     stretch.begins['x'] = np.where(seen, stretch.rests, np.nan)
@@ -199,7 +197,7 @@ class Bench:
         score = scored(bool(effects))(
             grid.u,
             grid.dt,
-            self.start(index, values),
+            self.start(index, values, effects),
             theta,
             composition.finest,
             composition.effects,
@@ -236,11 +234,13 @@ class Bench:
         p2, dt = outputs[OUTPUTS.index('p2'), ::PARTS], PARTS * grid.dt[::PARTS]
         return leading(p2, dt, values['T_g1'], values['T_g2'])
 
-    def start(self, index: int, values: Mapping[str, float]) -> Array:
+    def start(self, index: int, values: Mapping[str, float], effects: Sequence[str] = ()) -> Array:
         """Return the state before a stretch: as fitted, else as first measured."""
         suffix = f'.{index}' if index else ''
         first = self.stretches[index].first
         p1, p2, x = (values.get(f'{name}_0{suffix}', first[name]) for name in OUTPUTS)
+        if CALIBRATION.id in effects:
+            x = place(x, *(values[f'{CALIBRATION.id}.{name}'] for name in ('zero', 'span')))
         v = self.stretches[index].speed
         return np.array([p1, p2, x, v, np.sign(v), abs(np.sign(v)), p1, p1, 0.0])
 

@@ -25,8 +25,9 @@ TINY = 1e-6
 BIN, LONG, WITHIN, AS_PLAIN = 0.01, 32, 0.5, 0.98
 """Bins in which x is counted [%], how much longer their spectrum is than the span; how near to its
 peak a grid is sought [1 / range of x], and how nearly as well one through 0 must be kept."""
-REST, FEW = 5, 8
-"""Samples over which two means agree while the stem rests, and too few for a slope."""
+REST, FEW, CREEPS = 5, 8, 3.0
+"""Samples over which two means agree while the stem rests, the fewest that show a pace, and how
+far one drifts before it has surely moved if it moves when the record begins [noise]."""
 NEAR, ALIKE = 15, 3.0
 """Samples on either side over which x is smoothed, those that differ by less than this [noise]."""
 WIDTHS, MISFIT, RUN, BENT, BENDS = (3, 5, 9, 15, 31), 1.7, 3, 2.0, 5.0
@@ -136,11 +137,17 @@ def still(x: Array, noise: float) -> Mask:
     return still
 
 
-def slope_of(values: Array) -> float:
-    """Return the slope of a straight line through some values, per sample; 0 if they are few."""
-    if values.size < FEW:
-        return 0.0
-    return float(np.polyfit(np.arange(values.size), values, 1)[0])
+def pace(x: Array, departed: int, noise: float) -> float:
+    """Return how fast a stem moves when its record begins [% per sample], 0 if it rests.
+
+    By the sample `departed` it has surely moved. If that is soon it may have slipped: one that
+    creeps is on a straight line.
+    """
+    first = x[: max(departed, FEW)]
+    at = np.arange(first.size)
+    slope, level = np.polyfit(at, first, 1)
+    bent = departed < FEW and np.mean((first - level - slope * at) ** 2) > MISFIT * noise**2
+    return 0.0 if bent or abs(slope) * departed <= CREEPS * noise else float(slope)
 
 
 def wild(values: Array, limit: float) -> Mask:

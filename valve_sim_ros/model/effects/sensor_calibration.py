@@ -15,6 +15,11 @@ def sensor(value: float, state: Any, p: Any, memory: Any, dt: float) -> float:
     return p[0] + p[1] * value
 
 
+def place(measured: float, zero: float, span: float) -> float:
+    """Return the true position of a stem that is measured somewhere [% of span]."""
+    return (measured - zero) / span
+
+
 EFFECT = Effect(
     id='sensor_calibration',
     title='Zero or span error of the position sensor',
