@@ -89,12 +89,12 @@ def test_a_lag_before_the_play_is_told_from_one_behind_it():
 QUICK = {'f_d1': 0.5, 'T_g1': 1.0, 'T_g2': 2.0, 'f_s': 4.0, 'f_d': 2.4}
 
 
-def sampled(u, every, offset=0):
+def sampled(u, every, offset=0, **values):
     """Return a record in which only some samples of the commands, and of what follows, are seen.
 
     Outputs are seen `offset` samples after the command beside them.
     """
-    run = simulate(u, 0.05, QUICK)
+    run = simulate(u, 0.05, {**QUICK, **values})
     rng = np.random.default_rng(1)
     outputs = (each[offset::every] for each in (run.p1, run.p2))
     noisy = [each + 0.2 * rng.standard_normal(each.size) for each in outputs]
@@ -114,6 +114,16 @@ def test_steps_that_come_at_any_time_are_put_where_they_came(offset):
     assert max(ladder.before.excess for ladder in found.ladders) < 0.2
     values = found.base_valve.values
     assert [values[n] for n in ('T_g1', 'T_g2')] == pytest.approx([1.0, 2.0], rel=0.03)
+
+
+def test_some_steps_may_come_between_those_on_either_side_of_a_sample():
+    rng = np.random.default_rng(2)
+    since = rng.choice([0, 1, 6], 50, p=[0.2, 0.6, 0.2])
+    starts = 10 * np.cumsum(rng.integers(25, 60, 50)) + since
+    u = np.repeat(rng.uniform(10.0, 90.0, 50), np.diff(starts, prepend=0))
+    found = diagnose([sampled(u, 10, T_g1=3.0, T_g2=9.0)])
+    assert found.verdict == 'adequate'
+    assert max(ladder.before.mean_square for ladder in found.ladders) < 1.0  # noise
 
 
 def test_an_effect_of_the_chamber_is_no_scatter_of_commands():

@@ -21,8 +21,9 @@ WHOLE, MOST = 0.3, 0.7
 """So near to a whole period, and so many of the steps."""
 RARE = 1 / 3
 """Those on time are late where they are so few beside the early ones."""
-SURE = 0.25
-"""The error with which a step must be told [periods]."""
+SURE, WORTH = 0.25, 10.0
+"""The error with which a step must be told [periods], and what it must save if each of them comes
+at a time of its own."""
 LEAST_PUSH, MOST_CELLS = 1.0, 5e6
 """What a sample more of a step must do to p2 [noise]; the largest are looked at, no more cells of
 samples times steps than so many."""
@@ -65,15 +66,49 @@ def put_in_its_period(fitter: Fitter, group: Group, valve: Valve, problem: Probl
             for stretch, steps in zip(stretches, found_early, strict=True):
                 stretch.put(steps, True)
             return fitter.refined(valve, problem)
-        for stretch, u in zip(stretches, sent, strict=True):
-            stretch.send(u)
-        return _when_they_came(fitter, valve, problem, each)
+        _send(stretches, sent)
+        if _spotless(fitter, valve, problem):
+            return valve
+        there = _when_they_came(fitter, valve, problem, each)
+        if _spotless(fitter, there, problem):
+            return there
+        _together(stretches)
+        return valve
     sooner = on_time > RARE * early
     for stretch, (steps, shifts, errors) in zip(stretches, each, strict=True):
         # those that are hardly told stay with the most
         likelier_early = (shifts - 0.5) / errors**2 + math.log(early / on_time) > 0.0
         stretch.put(steps[likelier_early == sooner], sooner)
-    return fitter.refined(valve, problem)
+    there = fitter.refined(valve, problem)
+    if _spotless(fitter, there, problem):
+        return there
+    # some may come in between
+    put = [stretch.u for stretch in stretches]
+    _send(stretches, sent)
+    between = _when_they_came(fitter, valve, problem, each)
+    if between.cost < there.cost - WORTH * told.size:
+        return between
+    _together(stretches)
+    _send(stretches, put)
+    return there
+
+
+def _spotless(fitter: Fitter, valve: Valve, problem: Problem) -> bool:
+    """Tell whether nothing but noise is left."""
+    _, signal, drive = problem
+    return leftover(fitter.residuals(valve, signal, drive)).excess <= odds.SPOTLESS
+
+
+def _send(stretches: Sequence[Stretch], commands: Sequence[Array]) -> None:
+    """Let the valve receive these commands."""
+    for stretch, u in zip(stretches, commands, strict=True):
+        stretch.send(u)
+
+
+def _together(stretches: Sequence[Stretch]) -> None:
+    """Let all steps of the command come alike."""
+    for stretch in stretches:
+        stretch.scatter(*NONE)
 
 
 def _when_they_came(
@@ -82,24 +117,15 @@ def _when_they_came(
     problem: Problem,
     told: Sequence[tuple[Rows, Array, Array]],
 ) -> Valve:
-    """Let each step come when it was told to have come, if nothing but noise is left then.
+    """Return the valve refitted, each step of the command coming when it was told to have come.
 
     Who sends commands keeps other times than who takes samples.
     """
-    _, signal, drive = problem
-    if leftover(fitter.residuals(valve, signal, drive)).excess <= odds.SPOTLESS:
-        return valve
-    phase, stretches = valve.values['phase'], fitter.bench.stretches
-    for stretch, (steps, shifts, errors) in zip(stretches, told, strict=True):
+    for stretch, (steps, shifts, errors) in zip(fitter.bench.stretches, told, strict=True):
         known = SPREAD**2 / (SPREAD**2 + errors**2)
         came = np.clip(shifts, fitter.phase.lower, fitter.phase.upper)
-        stretch.scatter(steps, known * (came - phase))
-    there = fitter.refined(valve, problem)
-    if leftover(fitter.residuals(there, signal, drive)).excess <= odds.SPOTLESS:
-        return there
-    for stretch in stretches:
-        stretch.scatter(*NONE)
-    return valve
+        stretch.scatter(steps, known * (came - valve.values['phase']))
+    return fitter.refined(valve, problem)
 
 
 def shifts_of_steps(
