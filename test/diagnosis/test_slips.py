@@ -15,7 +15,14 @@ from valve_sim_ros.diagnosis.bench import Bench
 from valve_sim_ros.diagnosis.fitting import Fitter, Valve
 from valve_sim_ros.diagnosis.proof import prove
 from valve_sim_ros.diagnosis.race import race
-from valve_sim_ros.diagnosis.seen import drift_seen, dwell_seen, shaken_seen, stops_seen
+from valve_sim_ros.diagnosis.seen import (
+    drift_seen,
+    dwell_seen,
+    shaken_seen,
+    stops_seen,
+    TOLD_BETTER,
+    WANDER,
+)
 from valve_sim_ros.diagnosis.stages import groups
 from valve_sim_ros.diagnosis.stretch import CAUGHT
 from valve_sim_ros.diagnosis.unknowns import complete
@@ -96,7 +103,7 @@ def test_what_holds_the_stem_early_and_late_shows_how_friction_drifts(rate, sett
     there = {'friction_drift.rate': rate, 'friction_drift.settling': settling}
     bench = shaken(('friction_drift',), **there)
     results = bench.run(complete(SLOW))
-    starts = drift_seen(bench, results)
+    starts = drift_seen(bench, results, scatters=TOLD_BETTER)
     assert bool(starts) == bool(rate)
     for start in starts[bool(settling) :]:  # a line is not told from what hardly settles
         for time in (0.0, bench.stretches[0].time[-1]):
@@ -106,6 +113,22 @@ def test_what_holds_the_stem_early_and_late_shows_how_friction_drifts(rate, sett
                 for settles in [law['friction_drift.settling']]
             )
             assert told == pytest.approx(held, rel=0.15)
+
+
+@pytest.mark.parametrize(('rate', 'settling'), [(30.0, 0.0), (200.0, 12.0)])
+def test_where_the_stem_leaves_its_rests_early_and_late_shows_how_the_sensor_drifts(
+    rate, settling
+):
+    there = {'sensor_drift.rate': rate, 'sensor_drift.settling': settling}
+    bench = shaken(('sensor_drift',), **there)
+    start = drift_seen(bench, bench.run(complete(SLOW)), WANDER)[bool(settling)]
+    assert start['f_s'] == pytest.approx(VALUES['f_s'], rel=0.1)
+    last = bench.stretches[0].time[-1]
+    held, told = (
+        law['sensor_drift.rate'] * drifted(last, law['sensor_drift.settling'])
+        for law in (there, start)
+    )
+    assert told == pytest.approx(held, rel=0.1)
 
 
 @pytest.mark.parametrize('stops', [{}, {'lower': 38.0}, {'upper': 52.0}])

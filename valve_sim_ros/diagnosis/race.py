@@ -30,6 +30,7 @@ from .seen import (
     SHAKES,
     STOPS,
     stops_seen,
+    WANDER,
 )
 from .stages import Candidate, Group
 from .starts import friction_grid, grid, START
@@ -93,7 +94,7 @@ def race(
             # a play of the converter may have made up for friction
             frictions += [{**each, 'f_d1': START['f_d1']} for each in frictions]
         shown = {
-            DRIFT: drift_seen(fitter.bench, results),
+            **{name: drift_seen(fitter.bench, results, name) for name in (DRIFT, WANDER)},
             DWELL: dwell_seen(fitter.bench, results),
             SHAKES: shaken_seen(fitter.bench, held),
             STOPS: stops_seen(fitter.bench, results),

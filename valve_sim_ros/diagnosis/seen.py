@@ -30,9 +30,10 @@ LEAST_RESTS = 20
 """Samples at rest that show what holds the stem."""
 DWELL, DWELLS, SCATTER = 'dwell_friction', tuple(np.geomspace(0.5, 200.0, 16).tolist()), 0.2
 """The effect, time constants that are tried [s], and how far what holds the stem scatters [%]."""
-DRIFT, SETTLINGS, TOLD_BETTER = 'friction_drift', (0.0, *np.geomspace(2.0, 40.0, 8).tolist()), 0.5
-"""The effect, rates at which it settles that are tried [1/h], and the part of what scatters that
-it leaves at most."""
+DRIFT, WANDER = 'friction_drift', 'sensor_drift'
+SETTLINGS, TOLD_BETTER = (0.0, *np.geomspace(2.0, 40.0, 8).tolist()), 0.5
+"""The effects, rates at which they settle that are tried [1/h], and the part of what scatters that
+one leaves at most that is told by rests alone."""
 STOPS, OUTERMOST, BEYOND, LEAST_PRESSED = 'travel_stops', 0.01, 1.0, 5
 """The effect, the share of rests that may lie beyond a stop, by how much more is left unmoved
 there than holds the stem elsewhere [% of span], and samples that show how far one yields."""
@@ -88,7 +89,8 @@ def dwell_seen(bench: Bench, results: Sequence[Array]) -> list[dict[str, float]]
     """
     pairs = zip(bench.stretches, results, strict=True)
     each = [_rests(bench, s, result) for s, result in pairs]
-    rest, force, _ = np.abs(np.concatenate([*each, np.empty((0, 3))])).T
+    rest, force, _, way = np.concatenate([*each, np.empty((0, 4))]).T
+    force = way * force
     if rest.size < LEAST_LEFT:
         return []
     found = []
@@ -111,25 +113,28 @@ def dwell_seen(bench: Bench, results: Sequence[Array]) -> list[dict[str, float]]
     return found
 
 
-def drift_seen(bench: Bench, results: Sequence[Array]) -> list[dict[str, float]]:
-    """Return starts of a friction that changes through the record, one for each form of its law.
+def drift_seen(
+    bench: Bench, results: Sequence[Array], effect: str = DRIFT, scatters: float = 1.0
+) -> list[dict[str, float]]:
+    """Return starts of a friction or a sensor that drifts, one for each form of the law.
 
     From what holds the stem when it leaves each rest: it is straight in the drift, how soon that
-    settles is tried. `results` as for `friction_seen`; none if it does not follow the time.
+    settles is tried. Friction holds it against its way, a sensor shows more or less either way.
+    `results` as for `friction_seen`; none if more than a part of what scatters is left.
     """
     # each stretch begins anew
-    _, force, time = _rests(bench, bench.stretches[0], results[0]).T
+    _, force, time, way = _rests(bench, bench.stretches[0], results[0]).T
     if force.size < LEAST_LEFT:
         return []
-    way = np.sign(force)
+    turned = way if effect == DRIFT else -np.ones(force.size)
 
     def fitted(grown: Array) -> tuple[float, float, float]:
-        """Return static friction, its change with what is grown, and what scatters."""
+        """Return static friction, the change with what is grown, and what scatters."""
 
         def missing(level: Array) -> Array:
-            return level[0] + way * (level[1] + level[2] * grown) - force
+            return level[0] + way * level[1] + turned * level[2] * grown - force
 
-        start = (0.0, np.median(np.abs(force)), 0.0)
+        start = (np.median(force), 0.5 * np.ptp(force), 0.0)
         fit = least_squares(missing, start, loss='cauchy', f_scale=SCATTER)
         return float(fit.x[1]), float(fit.x[2]), float(fit.cost)
 
@@ -138,8 +143,9 @@ def drift_seen(bench: Bench, results: Sequence[Array]) -> list[dict[str, float]]
     for some in (SETTLINGS[:1], SETTLINGS[1:]):
         laws = [(*fitted(np.array([drifted(t, k) for t in time])), k) for k in some]
         f_s, more, left_over, settling = min(laws, key=lambda law: law[2])
-        if f_s > 0.0 and left_over < TOLD_BETTER * constant:
-            found.append({'f_s': f_s, f'{DRIFT}.rate': more / f_s, f'{DRIFT}.settling': settling})
+        if f_s > 0.0 and left_over < scatters * constant:
+            rate = more / f_s if effect == DRIFT else more
+            found.append({'f_s': f_s, f'{effect}.rate': rate, f'{effect}.settling': settling})
     return found
 
 
@@ -233,8 +239,8 @@ def rests_show(bench: Bench, results: Sequence[Array]) -> bool:
     `results` as for `friction_seen`.
     """
     held = friction_seen(bench, results)[0]
-    shown = stops_seen(bench, results) or drift_seen(bench, results) or shaken_seen(bench, held)
-    return bool(shown)
+    drifts = drift_seen(bench, results, scatters=TOLD_BETTER)
+    return bool(stops_seen(bench, results) or drifts or shaken_seen(bench, held))
 
 
 def _left(bench: Bench, stretch: Stretch) -> list[tuple[int, int, float]]:
@@ -254,9 +260,10 @@ def _left(bench: Bench, stretch: Stretch) -> list[tuple[int, int, float]]:
 
 
 def _rests(bench: Bench, stretch: Stretch, result: Array) -> Array:
-    """Return how long each rest lasted, what then held the stem, and when, shape (n, 3).
+    """Return how long each rest lasted, what then held the stem, when, and its way, shape (n, 4).
 
-    In s, % of span (positive if the stem opens), s since the first sample.
+    In s, % of span (positive if the stem is pushed open), s since the first sample, 1 if it opens
+    and -1 if it closes.
     """
     near, time = LEAVES * bench.noise['x'], stretch.time
     found = []
@@ -264,8 +271,9 @@ def _rests(bench: Bench, stretch: Stretch, result: Array) -> Array:
         last = float(result[1, left - 1 : left + 1].mean())
         # nobody knows how long the first rest lasts; and a stem may creep with p2
         if first and abs(last - result[1, first]) > 2.0 * near:
-            found.append((time[left] - time[first], last - level, time[left] - time[0]))
-    return np.array(found).reshape(-1, 3)
+            way = np.sign(stretch.measured['x'][left] - level)
+            found.append((time[left] - time[first], last - level, time[left] - time[0], way))
+    return np.array(found).reshape(-1, 4)
 
 
 def mixed_arrivals(bench: Bench, results: Sequence[Array]) -> bool:
