@@ -56,3 +56,19 @@ def test_derivatives_are_those_of_the_rates(law, v, z):
     found = slopes(Bent(50.0, v, z), law)
     assert np.allclose([found.a_v, found.z_v], differences(v=1), rtol=1e-4, atol=1e-3)
     assert np.allclose([found.a_z, found.z_z], differences(z=1), rtol=1e-4, atol=1e-3)
+
+
+@pytest.mark.parametrize('elastic', [0.0, 0.95])
+@pytest.mark.parametrize('drop_speed', [0.005, 0.1, 20.0])
+@pytest.mark.parametrize('stem', [(2000.0, 150.0), (2000.0, 1.0), (100.0, 150.0), (1.0, 20.0)])
+def test_a_stem_that_next_to_nothing_holds_does_not_run_away(stem, drop_speed, elastic):
+    free = Bristles(
+        *stem, 200.0, 0.4 / stem[0] ** 0.5, drop_speed, elastic, Friction(5, 5, 0, 0, 1)
+    )
+    rng = np.random.default_rng(3)
+    bent, memory, p2, period = Bent(50.0, 0.0, 0.0), np.full(2, np.nan), 50.0, 0.2
+    for target in np.repeat(rng.uniform(20.0, 80.0, 12), 30):
+        excess = p2 - target
+        bent = through(bent, target, excess, 0.3, period, free, memory)
+        p2 = target + excess * math.exp(-0.3 * period)
+        assert abs(bent.x - 50.0) < 80.0

@@ -15,9 +15,12 @@ from .stem import Friction
 
 SLOW, FAST = 1e-3, 6.0
 """Speeds below which all of f_s - f_d is left, and beyond which nothing [v_s]."""
+LEAST, SHARE = 1e-2, 0.03
+"""The least that is left of friction [% of span, f_s]: where bristles carry nothing the law itself
+runs away."""
 TOLERANCE = 1e-4
 """Error of a step [% of span]: of x, of the bristles, of the speed over the fastest rate."""
-FIRST, SHORTEST = 0.1, 2e-4
+FIRST, SHORTEST = 0.1, 2e-5
 """First step times the fastest rate, and shortest step [s]."""
 LESS, MORE, SAFE = 0.2, 4.0, 0.9
 """A step is at least and at most so many times the one before, and so much of what would do."""
@@ -74,13 +77,15 @@ def friction_at(v: float, b: Bristles) -> tuple[float, float, float]:
     """Return friction at a speed, what of it is f_d, and its derivative by the speed."""
     f = b.friction
     static, dynamic = (f.static_up, f.dynamic_up) if v >= 0.0 else (f.static_down, f.dynamic_down)
-    ratio = v / b.drop_speed
-    if abs(ratio) >= FAST:
-        return dynamic + 1e-6, dynamic, 0.0
-    rise = static - dynamic
-    if abs(ratio) > SLOW:
-        rise *= math.exp(-ratio * ratio)
-    return dynamic + 1e-6 + rise, dynamic, -2.0 * ratio / b.drop_speed * rise
+    dynamic = max(dynamic, SHARE * static)
+    ratio, rise = v / b.drop_speed, 0.0
+    if abs(ratio) < FAST:
+        rise = max(static - dynamic, 0.0)
+        if abs(ratio) > SLOW:
+            rise *= math.exp(-ratio * ratio)
+    if dynamic + rise < LEAST:
+        return LEAST, dynamic, 0.0
+    return dynamic + rise, dynamic, -2.0 * ratio / b.drop_speed * rise
 
 
 @njit(forceinline=True)
@@ -137,7 +142,8 @@ def stage(right: Bent, s: Slopes, a_x: float, pole: float) -> Bent:
     """Return what of one stage solves (pole - Jacobian) g = right."""
     one, two = pole - s.a_v - a_x / pole, pole - s.z_z
     force = right.v + a_x * right.x / pole
-    v = (force * two + s.a_z * right.z) / (one * two - s.a_z * s.z_v)
+    both = one * two - s.a_z * s.z_v
+    v = (force * two + s.a_z * right.z) / (both if both != 0.0 else 1.0)
     return Bent((right.x + v) / pole, v, (right.z + s.z_v * v) / two)
 
 
@@ -213,6 +219,9 @@ def through(
 ) -> Bent:
     """Take the stem through `duration` seconds; `memory` keeps the length of its next step."""
     h, left = memory[1], duration
+    # none carries more than static friction, however short of time a step is
+    most_up = (b.friction.static_up + LEAST) / b.stiffness
+    most_down = (b.friction.static_down + LEAST) / b.stiffness
     if math.isnan(h):
         h = FIRST / fastest(b)
     while left > NOTHING:
@@ -222,12 +231,13 @@ def through(
         after, error = step(bent, target, excess, rate, part, b)
         # a run that blew up must go on
         factor = min(max(SAFE * error**-0.25, LESS), MORE) if error > 1e-9 else MORE
+        then = max(factor * part, SHORTEST)
         if error > 1.0 and part > SHORTEST:
-            h = factor * part
+            h = then
             continue
-        bent = after
+        bent = Bent(after.x, after.v, min(max(after.z, -most_down), most_up))
         left -= part
         excess *= math.exp(-rate * part)
-        h = factor * part if part == h else max(h, factor * part)
+        h = then if part == h else max(h, then)
     memory[1] = h
     return bent
