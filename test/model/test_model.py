@@ -151,6 +151,7 @@ def test_a_slot_takes_an_effect():
         'tubing_slot',
         'flow_slot',
         'force_slot',
+        'reach_slot',
         'stride_slot',
         'motion_slot',
         'sensor_slot',

@@ -58,6 +58,8 @@ flow_slot = unchanged
 """(target [% of span], rate [1/s]) of p2: leak, volume, nonlinear flow, quick exhaust."""
 force_slot = unchanged
 """(opening force offset [% of span], Friction): spring, friction and fluid effects."""
+reach_slot = unchanged
+"""How far that force may lie from its value in a step [% of span]: forces that come and go."""
 stride_slot = unchanged
 """Longest step while the stem moves [s]: friction that follows its speed or its place."""
 motion_slot = unchanged
@@ -122,6 +124,16 @@ def pushed(
 
 
 @njit(forceinline=True)
+def may_slip(motion: Motion, x: float, dt: float, reach: float) -> bool:
+    """Tell whether a stem that rests in a step may slip, as the force lies up to `reach` off."""
+    friction, spring = motion.friction, motion.friction.stiffness * x
+    first = motion.target + motion.excess
+    last = motion.target + motion.excess * math.exp(-motion.rate * dt)
+    high, low = max(first, last) + reach - spring, min(first, last) - reach - spring
+    return high > friction.static_up or low < -friction.static_down
+
+
+@njit(forceinline=True)
 def advance(
     u: float,
     state: State,
@@ -163,9 +175,11 @@ def advance(
     while left > 0:
         motion = pushed(inlet, lag, now, theta, step, effects, memory)
         moves = motion.stem.direction != 0.0 or motion.stem.x != state.x or state.v != 0.0
+        reach = reach_slot(0.0, state, effects, memory, dt)
+        moves = moves or (reach > 0.0 and may_slip(motion, state.x, dt, reach))
         if moves and step.step == dt:
             longest = stride_slot(BASE_STEP, state, effects, memory, dt)
-            if abs(motion.stem.v - state.v) < STEADY * abs(state.v):
+            if reach == 0.0 and abs(motion.stem.v - state.v) < STEADY * abs(state.v):
                 longest *= GLIDE
             if longest < dt:  # again, in short steps
                 left = math.ceil(dt / longest)

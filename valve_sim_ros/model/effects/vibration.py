@@ -20,6 +20,12 @@ def force(value: Any, state: Any, p: Any, memory: Any, dt: float) -> tuple[float
     return offset + amplitude * math.sin(angle), friction
 
 
+@njit
+def reach(value: float, state: Any, p: Any, memory: Any, dt: float) -> float:
+    """Return how far the force may lie from that in the middle of a step [% of span]."""
+    return value + abs(p[0]) * min(math.pi * p[1] * dt, 2.0)
+
+
 EFFECT = Effect(
     id='vibration',
     title='Vibration',
@@ -62,8 +68,8 @@ EFFECT = Effect(
             starts=(-2.4, -0.8, 0.8, 2.4),
         ),
     ),
-    slots={'force_slot': force},
-    longest_step=0.02,
+    slots={'force_slot': force, 'reach_slot': reach},
+    stride=0.02,
     order=90,
     explanation='A pump, cavitation or pulsating flow shakes the stem.',
     symptom='Periodic slips and a line in the spectrum of x.',
