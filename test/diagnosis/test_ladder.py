@@ -437,6 +437,23 @@ def test_a_laborious_effect_does_not_run_where_another_explains_the_signal(monke
     assert set(tried) == {'travel_stops'}
 
 
+def test_where_there_is_no_gap_what_a_base_valve_imitates_is_tried(monkeypatch):
+    fitter, base = fitted(measured())
+    tried = []
+
+    def screened(fitter, candidate, *rest):
+        tried.append(candidate.effect)
+        return replace(base, effects=(candidate.effect,), candidates=(candidate,))
+
+    monkeypatch.setattr(racing, 'screened', screened)
+    monkeypatch.setattr(Fitter, 'residuals', lambda *_: np.random.default_rng(0).normal(size=2000))
+    for how in ('evolve', 'fit', 'refined'):
+        monkeypatch.setattr(Fitter, how, lambda self, valve, *rest: valve)
+    some = [c for c in STEM.candidates() if c.effect in ('spring_rate', 'linkage_backlash')]
+    race(fitter, STEM, base, some)
+    assert tried == ['spring_rate', 'linkage_backlash']
+
+
 def test_an_effect_found_in_p1_is_not_fitted_anew_to_p2():
     """A leak looks like a converter's span to p2, which must not undo what p1 shows."""
     both = {'ip_calibration.span': 0.97, 'air_leak.leak_rate': 0.36}

@@ -196,7 +196,8 @@ def race(
             runners, waiting = ([*raced], []) if promising(raced) else ([], [*raced])
         else:
             runners = heat([], quick)
-            if runners and nearly_all(runners[0]):
+            # where there is no gap nothing closes it
+            if runners and left >= FAINT and nearly_all(runners[0]):
                 effect = runners[0].candidates[-1].effect
                 imitated = [e for e in imitated if odds.look_alike(effect, e.effect)]
             runners = heat(runners, imitated)
