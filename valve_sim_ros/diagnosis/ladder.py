@@ -230,7 +230,7 @@ def climb(
                 rungs[-1] = replace(rung, after=rest, closed=rung.before.closed_by(rest))
                 break
             others = [each for each in candidates if each.effect != rung.effect]
-            quick = [each for each in others if not CATALOGUE[each.effect].laborious]
+            quick = [each for each in others if not each.laborious]
             candidates = quick if again and not hastily else others
         progress(1.0)
         complete = True

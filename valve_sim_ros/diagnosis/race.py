@@ -190,7 +190,7 @@ def race(
             return odds.nearly_all(before, whole(best))
 
         quick, imitated, slow = (
-            [each for each in candidates if _tier(each.effect) == tier] for tier in range(3)
+            [each for each in candidates if _tier(each) == tier] for tier in range(3)
         )
         if raced:
             runners, waiting = ([*raced], []) if promising(raced) else ([], [*raced])
@@ -217,7 +217,7 @@ def race(
             effect = best.candidates[-1].effect
             slow = [e for e in slow if e in hidden or odds.look_alike(effect, e.effect)]
         elif ended and left < (odds.CLEAN if valve.candidates else FAINT):
-            slow = [e for e in slow if e in hidden or not CATALOGUE[e.effect].laborious]
+            slow = [e for e in slow if e in hidden or not e.laborious]
         # a law with one more parameter is tried only where the plain one leaves something
         further = [e for e in slow if group.has_stem and _extends(e, slow)]
         runners = heat(runners, [e for e in slow if e not in further], last=not further)
@@ -241,10 +241,10 @@ def _extends(candidate: Candidate, others: Sequence[Candidate]) -> bool:
     return any({*each.names} < {*candidate.names} for each in same)
 
 
-def _tier(effect: str) -> int:
-    """Return how late an effect is tried: a search for one takes many times as long as another."""
-    declared = CATALOGUE[effect]
-    if declared.laborious or declared.rugged:
+def _tier(candidate: Candidate) -> int:
+    """Return how late one is tried: a search for one takes many times as long as for another."""
+    declared = CATALOGUE[candidate.effect]
+    if candidate.laborious or declared.rugged:
         return 2
     return 1 if declared.imitated else 0
 
@@ -279,7 +279,7 @@ def _deepened(
         # far behind one that explains the signal, others need no deeper search
         hopeless = explains(best) and each.cost > best.cost / FAR_AHEAD
         added = each.candidates[-1]
-        if hopeless or added not in candidates or CATALOGUE[added.effect].laborious:
+        if hopeless or added not in candidates or added.laborious:
             continue
         progress(1.0)
         there = find_base(fitter, group, each, fitter.drive)

@@ -96,7 +96,7 @@ def screened(
     effect = CATALOGUE[candidate.effect]
     # in a second look the stem is put to rest for all, and beside another effect it takes long
     caught = not PUT_TO_REST.isdisjoint(fitter.drive)
-    led = RESTS in fitter.drive or (caught and (effect.laborious or not effect.rugged))
+    led = RESTS in fitter.drive or (caught and (candidate.laborious or not effect.rugged))
     # what tells on every slip
     some = starts if effect.rugged or effect.imitated else starts[len(own) - len(suited) :]
     odd = odds.imitates(valve, candidate.effect)

@@ -41,6 +41,12 @@ class Candidate:
         return {f'{self.effect}.{p.name}': p.neutral for p in CATALOGUE[self.effect].parameters}
 
     @property
+    def laborious(self) -> bool:
+        """Tell whether a run with it takes many times as long as others."""
+        effect = CATALOGUE[self.effect]
+        return effect.laborious and not {*self.names} <= {*effect.light}
+
+    @property
     def places(self) -> int:
         """Number of places in which a search looks for it."""
         return math.prod(len(starts_of(declared(self.effect, name))) for name in self.names)

@@ -171,6 +171,8 @@ class Effect:
         Place along the signal path among the effects of one slot.
     laborious : bool
         A run with it takes many times as long: a search tries others first.
+    light : tuple of str
+        Parameters with which alone a run of a laborious effect takes no longer than others.
     rugged : bool
         A fit of it has many valleys: a search follows each of its starts further.
     imitated : str
@@ -201,6 +203,7 @@ class Effect:
     stride: float = math.inf
     order: int = 0
     laborious: bool = False
+    light: tuple[str, ...] = ()
     rugged: bool = False
     imitated: Literal['', 'friction', 'stem'] = ''
     twins: Mapping[str, str] = field(default_factory=dict)

@@ -147,6 +147,7 @@ EFFECT = Effect(
         ('stuck_compliance',),
     ),
     laborious=True,
+    light=('stuck_compliance',),
     twins={
         'sensor_quantisation': 'small steps of a coarse sensor hide micro-motion: finer sensor',
         'hysteresis': 'hysteresis of the converter shows in p1 already: record p1',
