@@ -174,13 +174,14 @@ def advance(
     step, now, left = transition, state, 1
     while left > 0:
         motion = pushed(inlet, lag, now, theta, step, effects, memory)
-        moves = motion.stem.direction != 0.0 or motion.stem.x != state.x or state.v != 0.0
-        reach = reach_slot(0.0, state, effects, memory, dt)
-        moves = moves or (reach > 0.0 and may_slip(motion, state.x, dt, reach))
-        if moves and step.step == dt:
-            longest = stride_slot(BASE_STEP, state, effects, memory, dt)
-            if reach == 0.0 and abs(motion.stem.v - state.v) < STEADY * abs(state.v):
-                longest *= GLIDE
+        if step.step == dt:
+            moves = motion.stem.direction != 0.0 or motion.stem.x != state.x or state.v != 0.0
+            reach = reach_slot(0.0, state, effects, memory, dt)
+            longest = BASE_STEP
+            if moves or (reach > 0.0 and may_slip(motion, state.x, dt, reach)):
+                longest = stride_slot(BASE_STEP, state, effects, memory, dt)
+                if reach == 0.0 and abs(motion.stem.v - state.v) < STEADY * abs(state.v):
+                    longest *= GLIDE
             if longest < dt:  # again, in short steps
                 left = math.ceil(dt / longest)
                 step = transition_after(transition, dt / left, BASE_STEP)
