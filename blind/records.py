@@ -106,10 +106,10 @@ def record_part(plan: Plan, recorder: Recorder) -> slice:
     return slice(first, first + round(plan.length / recorder.period))
 
 
-def plausible(trace: Trace) -> bool:
-    """Tell whether the stem stays within its stroke and moves."""
+def plausible(trace: Trace, part: slice) -> bool:
+    """Tell whether the stem stays within its stroke, and moves in this part, the record."""
     whole = np.isfinite(trace.x).all() and trace.stem.min() > -4.0 and trace.stem.max() < 104.0
-    return bool(whole and np.ptp(trace.stem) > 10.0)
+    return bool(whole and np.ptp(trace.stem[part]) > 10.0)
 
 
 def steps_show(plan: Plan, recorder: Recorder) -> bool:
@@ -169,7 +169,7 @@ def draw(
         part = record_part(plan, recorder)
         times = sample_times(recorder, part.stop, rng)
         trace = run(plan, plan.valve(), recorder, times)
-        if not plausible(trace):
+        if not plausible(trace, part):
             continue
         seen: dict[str, dict[str, float]] = {}
         unexplained: dict[str, dict[str, float]] = {}

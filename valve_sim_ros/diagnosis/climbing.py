@@ -15,6 +15,7 @@ from .base_valve import find_base
 from .coarse import rounded
 from .fitting import by_cost, FINE, Fitter, GENERATIONS, NARROW, PATIENT, Valve
 from .ladder import climb, concluded, excused, Ladder, MOST_EFFECTS
+from .loop import acts_back, closed_loop
 from .rung import Rung
 from .stages import Candidate, Group
 from .stretch import CAUGHT, HELD, MODELLED, RESTS
@@ -51,7 +52,7 @@ def climb_all(
             for ladder in ladders
         )
         candidates = () if blind else group.candidates(known)
-        drive = fitter.drive
+        drive, refit = fitter.drive, bool(ladders)
         if not group.has_stem:
             with suppress(*stops):
                 fitter.drive = _best_drive(fitter, group, valve, ladders)
@@ -60,11 +61,17 @@ def climb_all(
         elif _carries_on(fitter, group, valve):
             fitter.bench.before = valve.effects
             fitter.drive = drive = (*fitter.drive, MODELLED)
+            if acts_back(valve):
+                with suppress(*stops):
+                    if alone := closed_loop(fitter, parts, valve):
+                        valve, fitter.drive, drive = alone, (), ()
+                        ladders = [replace(each, valve=valve) for each in ladders]
+                        refit = False
         carried = max((each.after.excess for each in ladders), default=0.0)
         climbing = partial(climb, fitter, group, named=added, stops=stops)
         first = partial(
             climbing,
-            refit=bool(ladders),
+            refit=refit,
             carried=carried,
             progress=_within(tell, share, width, text),
         )

@@ -173,6 +173,8 @@ class Effect:
         A run with it takes many times as long: a search tries others first.
     light : tuple of str
         Parameters with which alone a run of a laborious effect takes no longer than others.
+    feedback : bool
+        The stem acts back through it on the stages before.
     rugged : bool
         A fit of it has many valleys: a search follows each of its starts further.
     imitated : str
@@ -204,6 +206,7 @@ class Effect:
     order: int = 0
     laborious: bool = False
     light: tuple[str, ...] = ()
+    feedback: bool = False
     rugged: bool = False
     imitated: Literal['', 'friction', 'stem'] = ''
     twins: Mapping[str, str] = field(default_factory=dict)

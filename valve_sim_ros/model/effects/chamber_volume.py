@@ -69,6 +69,7 @@ EFFECT = Effect(
     memory=1,
     stride=0.01,
     order=10,
+    feedback=True,
     variants=(('ratio',), ('ratio', 'displacement')),
     explanation='The opening stem enlarges the chamber, so the same flow raises p2 more slowly.',
     symptom='Rates of p2 fall as x opens; p2 dips at each slip.',

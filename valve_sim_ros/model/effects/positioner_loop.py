@@ -127,5 +127,6 @@ EFFECT = Effect(
     symptom='p1 moves while u rests, and overshoots after each step until the stem has followed.',
     confirm='Hold u after a step and watch p1; or bypass the positioner.',
     laborious=True,
+    feedback=True,
     twins={'ip_calibration': 'a span error does not move p1 while u rests: record p1'},
 )
