@@ -3,16 +3,23 @@
 """Effects that look like the best of a race, sought from where that ended."""
 
 from collections.abc import Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+import os
 
 from . import odds
+from .adequacy import leftover
 from .fitting import by_cost, Fitter, Valve
 from .stages import Candidate, Group
+
+NEAR = 10.0
+"""Beside the best one that costs so many times more is no twin, however long it is sought."""
 
 
 def alike(fitter: Fitter, group: Group, runners: Sequence[Valve]) -> list[Valve]:
     """Return the runners, those that look like the best sought from its base valve as well."""
     best = runners[0]
     effect = best.candidates[-1].effect
+    explains = leftover(fitter.residuals(best, group.signal)).excess <= odds.CLEAN
     base = {unknown.name: best.values[unknown.name] for unknown in fitter.unknowns(group)}
 
     def sought(runner: Valve) -> Valve:
@@ -21,10 +28,17 @@ def alike(fitter: Fitter, group: Group, runners: Sequence[Valve]) -> list[Valve]
             return runner
         own = [{**base, **start} for start in ({}, *candidate.starts({}))]
         starts = [{**runner.values, **each} for each in (*own, *_same(best, candidate, base))]
-        there = fitter.scan(runner, starts, fitter.problem(group, runner))[0]
-        return min(runner, fitter.fit(there, fitter.problem(group, there)), key=by_cost)
+        problem = fitter.problem(group, runner)
+        there = fitter.fit(fitter.scan(runner, starts, problem)[0], problem)
+        there = min(runner, there, key=by_cost)
+        # where slips tell, it is not said to be worse before it was sought as long
+        near = odds.TWIN_GAIN < there.cost - best.cost < NEAR * best.cost
+        if explains and group.has_stem and near and not candidate.laborious:
+            there = min(there, fitter.refined(there, problem), key=by_cost)
+        return there
 
-    return sorted(map(sought, runners), key=by_cost)
+    with ThreadPoolExecutor(os.cpu_count()) as pool:  # compiled runs release the lock
+        return sorted(pool.map(sought, runners), key=by_cost)
 
 
 def _same(best: Valve, candidate: Candidate, base: Mapping[str, float]) -> list[dict[str, float]]:

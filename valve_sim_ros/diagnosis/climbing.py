@@ -52,7 +52,7 @@ def climb_all(
             for ladder in ladders
         )
         candidates = () if blind else group.candidates(known)
-        drive, refit = fitter.drive, bool(ladders)
+        drive, loop = fitter.drive, None
         if not group.has_stem:
             with suppress(*stops):
                 fitter.drive = _best_drive(fitter, group, valve, ladders)
@@ -62,16 +62,13 @@ def climb_all(
             fitter.bench.before = valve.effects
             fitter.drive = drive = (*fitter.drive, MODELLED)
             if acts_back(valve):
-                with suppress(*stops):
-                    if alone := closed_loop(fitter, parts, valve):
-                        valve, fitter.drive, drive = alone, (), ()
-                        ladders = [replace(each, valve=valve) for each in ladders]
-                        refit = False
+                loop = partial(closed_loop, fitter, parts)
         carried = max((each.after.excess for each in ladders), default=0.0)
         climbing = partial(climb, fitter, group, named=added, stops=stops)
         first = partial(
             climbing,
-            refit=refit,
+            refit=bool(ladders),
+            loop=loop,
             carried=carried,
             progress=_within(tell, share, width, text),
         )
@@ -88,6 +85,9 @@ def climb_all(
             ladder = _quickly(fitter, valve, candidates, first, again, stops)
         else:
             ladder = first(valve, candidates)
+        if loop and not fitter.drive:
+            drive = ()
+            ladders = [replace(each, valve=ladder.valve) for each in ladders]
         fitter.drive = drive
         ladder = concluded(ladder)
         if added:
@@ -160,9 +160,11 @@ def _quickly(
     One slip that comes at another moment spoils all that a free stem does until the next one: of
     two effects each looks as if it explained nothing. So before these it is looked at caught.
     """
+    modelled = MODELLED in fitter.drive
     hasty = climbing(valve, candidates, hastily=True)
     found = concluded(hasty)
-    if _final(found) or not hasty.complete or hasty.before.excess <= odds.CLEAN:
+    alone = modelled and not fitter.drive  # what the whole loop explains is explained
+    if alone or _final(found) or not hasty.complete or hasty.before.excess <= odds.CLEAN:
         return hasty
     base = hasty.base
     if found.outcome == 'unknown_effect':  # where little is left no slip hides much

@@ -64,6 +64,7 @@ def climb(
     hastily: bool = False,
     raced: Sequence[Valve] = (),
     most: int = MOST_EFFECTS,
+    loop: Callable[[Valve], tuple[Valve, Leftover] | None] | None = None,
     progress: Callable[[float], object],
     stops: tuple[type[BaseException], ...],
 ) -> Ladder:
@@ -92,6 +93,9 @@ def climb(
         What a first race ended with when done hastily.
     most : int
         Most effects to add.
+    loop : callable, optional
+        Fits a valve as it runs alone where the stem acts back, and tells what it leaves, if that
+        explains more than a stem as measured.
     progress : callable
         Called with the share done.
     stops : tuple of type
@@ -157,6 +161,8 @@ def climb(
                 loose, left = seen(loosened(fitter, group, now))
                 if not worth(left):
                     now, before = loose, left
+            if loop and worth(before) and (alone := loop(now)):
+                now, before = alone
             base, base_left = now, before
         rest = chance_apart(now, before)
         if rest is not before:
@@ -213,6 +219,10 @@ def climb(
                 rungs, rung = both[:-1], both[-1]
             elif not explained(rung):
                 guess = rung
+                if loop and rung.closed >= odds.LEAST_LED and (alone := loop(rung.valve)):
+                    now, before = alone
+                    rungs.append(_ending(rung, now, before))
+                    break
                 little = again or odds.adequate(group.signal, base_left)
                 if rung.closed < (odds.LEAST_AGAIN if little else odds.LEAST_FIRST):
                     break
@@ -227,7 +237,7 @@ def climb(
             rest = chance_apart(now, before)
             if rest is not before:
                 before = rest
-                rungs[-1] = replace(rung, after=rest, closed=rung.before.closed_by(rest))
+                rungs[-1] = _ending(rung, now, rest)
                 break
             others = [each for each in candidates if each.effect != rung.effect]
             quick = [each for each in others if not each.laborious]
@@ -262,7 +272,11 @@ def _with(fitter: Fitter, group: Group, rung: Rung, valve: Valve) -> Rung:
     """Return a step that ends at another valve."""
     if valve is rung.valve:
         return rung
-    after = leftover(fitter.residuals(valve, group.signal))
+    return _ending(rung, valve, leftover(fitter.residuals(valve, group.signal)))
+
+
+def _ending(rung: Rung, valve: Valve, after: Leftover) -> Rung:
+    """Return a step that ends at another valve, which leaves `after`."""
     return replace(rung, valve=valve, after=after, closed=rung.before.closed_by(after))
 
 
@@ -275,27 +289,17 @@ def _with_its_own_stem(fitter: Fitter, group: Group, rung: Rung) -> Rung:
         return rung
     drive = tuple(each for each in fitter.drive if each != HELD)
     after = leftover(fitter.residuals(rung.valve, group.signal, drive))
-    if after.excess >= rung.after.excess:
-        return rung
-    return replace(rung, after=after, closed=rung.before.closed_by(after))
+    return rung if after.excess >= rung.after.excess else _ending(rung, rung.valve, after)
 
 
 def _keeps_to_steps(fitter: Fitter, group: Group, valve: Valve) -> bool:
     """Tell whether x, where it seems to keep to steps, is better explained by a coarse sensor."""
     if not group.has_stem:
         return False
-    rounding = replace(valve, effects=tuple(dict.fromkeys((*valve.effects, odds.COARSE))))
-    each = [
-        replace(
-            rounding,
-            values={
-                **valve.values,
-                f'{odds.COARSE}.step': step,
-                f'{odds.COARSE}.offset': offset,
-            },
-        )
-        for step, offset in fitter.bench.grids_of_x
-    ]
+    effects = tuple(dict.fromkeys((*valve.effects, odds.COARSE)))
+    names = [f'{odds.COARSE}.{name}' for name in ('step', 'offset')]
+    grids = [dict(zip(names, grid, strict=True)) for grid in fitter.bench.grids_of_x]
+    each = [replace(valve, effects=effects, values={**valve.values, **grid}) for grid in grids]
     return any(fitter.score(one, group.signal, fitter.drive) < valve.cost for one in each)
 
 

@@ -26,31 +26,31 @@ def acts_back(valve: Valve) -> bool:
     return any(CATALOGUE[effect].feedback for effect in valve.effects)
 
 
-def closed_loop(fitter: Fitter, parts: Sequence[Group], valve: Valve) -> Valve | None:
-    """Return a valve fitted to each signal in turn while nothing is held as measured.
+def closed_loop(
+    fitter: Fitter, parts: Sequence[Group], valve: Valve
+) -> tuple[Valve, Leftover] | None:
+    """Return a valve fitted to each signal in turn while nothing is held, and what it leaves of x.
 
     Parameters
     ----------
     fitter : Fitter
-        At the bench, driven as the last group is.
+        At the bench; afterwards nothing drives it as measured if that explains x.
     parts : sequence of Group
         All groups, the stem in the last one.
     valve : Valve
-        With the effects of the stages before the stem, fitted with a stem as measured.
+        Fitted with a stem as measured.
 
     Returns
     -------
-    Valve or None
-        None if a stem held as measured explains x, or if nothing explains it here either.
+    tuple of Valve and Leftover, or None
+        None if this does not explain x either.
     """
     stem, drive = parts[-1], fitter.drive
 
     def left(there: Valve, group: Group) -> Leftover:
         return leftover(fitter.residuals(there, group.signal))
 
-    valve = find_base(fitter, stem, valve, drive)
-    if not odds.unfinished(left(valve, stem), odds.CLEAN):
-        return None
+    found = None
     fitter.drive = ()
     try:
         valve, least = find_base(fitter, stem, valve, (), roughly=True), math.inf
@@ -64,6 +64,9 @@ def closed_loop(fitter: Fitter, parts: Sequence[Group], valve: Valve) -> Valve |
                 best, least = valve, most
             if most <= odds.SPOTLESS or most > WORTH * before:
                 break
-        return None if odds.unfinished(left(best, stem), odds.CLEAN) else best
+        rest = left(best, stem)
+        found = None if odds.unfinished(rest, odds.CLEAN) else (best, rest)
     finally:
-        fitter.drive = drive
+        if not found:
+            fitter.drive = drive
+    return found
