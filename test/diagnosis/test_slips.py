@@ -26,6 +26,7 @@ from valve_sim_ros.diagnosis.seen import (
 from valve_sim_ros.diagnosis.stages import groups
 from valve_sim_ros.diagnosis.stretch import CAUGHT
 from valve_sim_ros.diagnosis.unknowns import complete
+from valve_sim_ros.identification.watch import Stop
 from valve_sim_ros.model.drift import drifted
 from valve_sim_ros.model.effects.dwell_friction import SHAPES
 from valve_sim_ros.recordings.quality import roughness
@@ -262,3 +263,28 @@ def test_a_caught_stem_shows_what_a_right_friction_closes():
 def test_friction_that_differs_by_direction_is_one():
     fitter, group, valve = fitter_of(**{'friction_asymmetry.difference': 0.3})
     assert on_time(fitter, group, valve).excess > odds.SPOTLESS
+
+
+def test_a_race_that_is_stopped_ends_with_what_was_found_until_then():
+    fitter, group, valve = fitter_of(**{'sensor_calibration.span': 0.9})
+    base = find_base(fitter, group, valve, ())
+    names = ('sensor_calibration', 'spring_rate', 'dwell_friction')
+    candidates = [each for each in group.candidates() if each.effect in names]
+    dwelt = []
+
+    def until_slow_ones_begin():
+        if dwelt:
+            raise Stop
+
+    def told(share):
+        dwelt.extend([share] if share >= 0.5 else [])
+
+    fitter.alive = until_slow_ones_begin
+    best, *others = race(fitter, group, base, candidates, told, stops=(Stop,))
+    assert best.candidates[-1].effect == 'sensor_calibration'
+    assert best.cost < 0.5 * base.cost
+    assert 'dwell_friction' not in {each.candidates[-1].effect for each in others}
+    with pytest.raises(Stop):  # and nothing begins any more
+        fitter.fit(best, fitter.problem(group, best))
+    with pytest.raises(Stop):
+        race(fitter, group, base, candidates, stops=(Stop,))

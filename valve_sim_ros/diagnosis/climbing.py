@@ -3,12 +3,11 @@
 """The ladders of all groups of stages, climbed in the order of the flow."""
 
 from collections.abc import Callable, Collection, Sequence
-from contextlib import suppress
 from dataclasses import replace
 from functools import partial
 import math
 
-from ..identification.watch import Progress, Stop
+from ..identification.watch import Progress
 from . import dead_time, odds
 from .adequacy import leftover
 from .base_valve import find_base
@@ -39,10 +38,8 @@ def climb_all(
     for index, group in enumerate(parts):
         added = any(ladder.rungs for ladder in ladders)
         if added:
-            try:
+            with fitter.ends_at(stops):
                 base = _refitted(fitter, group, base)
-            except stops:
-                tell = _stop
         share, width = 0.1 + 0.78 * index / len(parts), 0.78 / len(parts)
         text = f'looking at {group.signal}'
         known = {*without, *valve.effects}
@@ -54,7 +51,7 @@ def climb_all(
         candidates = () if blind else group.candidates(known)
         drive, loop = fitter.drive, None
         if not group.has_stem:
-            with suppress(*stops):
+            with fitter.ends_at(stops):
                 fitter.drive = _best_drive(fitter, group, valve, ladders)
             # behind a law that is not quite right, what it leaves would be sought again
             drive = tuple(each for each in fitter.drive if each != HELD)
@@ -104,10 +101,8 @@ def climb_all(
                 ladder = rounded(fitter, ladder, candidates, again)
             elif candidates and ladder.outcome == 'unknown_effect':
                 unknown, ladder = ladder, replace(ladder, complete=False)
-                with suppress(*stops):
+                with fitter.ends_at(stops):
                     ladder = _second_look(fitter, unknown, partial(again, candidates))
-        if not ladder.complete:
-            tell = _stop
         ladders.append(ladder)
         valve = ladder.valve
         if group.signal == 'p1' and dead_time.EFFECT in valve.effects:
@@ -191,7 +186,7 @@ def _freed(
     if caught.outcome != 'missing_effect':
         return None
     group, free = caught.group, caught.valve
-    with suppress(*stops):
+    with fitter.ends_at(stops):
         free = fitter.refined(free, fitter.problem(group, free))
     after = leftover(fitter.residuals(free, group.signal))
     found = replace(caught, base=hasty.base, valve=free, before=hasty.before, after=after)
@@ -287,8 +282,3 @@ def _refitted(fitter: Fitter, group: Group, valve: Valve) -> Valve:
     if group.has_stem:
         valve = fitter.evolve(valve, problem, GENERATIONS, NARROW)
     return fitter.fit(valve, problem)
-
-
-def _stop(share: float, text: str) -> None:
-    """Stop whatever tells how far it is."""
-    raise Stop

@@ -2,12 +2,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """Fits of one group of stages, from one start or from several."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 import math
 
 import numpy as np
 
+from ..identification.watch import Stop
 from ..model.pipeline import Array
 from .adequacy import leftover
 from .bench import Bench
@@ -70,6 +72,11 @@ def go_on() -> None:
     """Never end a search."""
 
 
+def ended() -> None:
+    """Let no search begin."""
+    raise Stop
+
+
 @dataclass
 class Fitter:
     """Fits valves to what a bench has measured.
@@ -84,6 +91,14 @@ class Fitter:
     drive: tuple[str, ...] = ()
     seed: int = 0
     alive: Callable[[], object] = go_on
+
+    @contextmanager
+    def ends_at(self, stops: tuple[type[BaseException], ...]) -> Iterator[None]:
+        """Let one of these exceptions go no further, and no search begin after it."""
+        try:
+            yield
+        except stops:
+            self.alive = ended
 
     def unknowns(self, group: Group) -> tuple[Unknown, ...]:
         """Return what a fit of the base valve varies in a group."""

@@ -3,7 +3,6 @@
 """The ladder: in one group of stages, one effect after the other until noise is left."""
 
 from collections.abc import Callable, Sequence
-from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -152,7 +151,7 @@ def climb(
         return odds.explained(group.signal, base_left, rung.after, [rung.effect], blurred)
 
     now, before = base, base_left = seen(valve)
-    with suppress(*stops):
+    with fitter.ends_at(stops):
         progress(0.0)
         if refit:
             now, before = seen(find_base(fitter, group, valve, fitter.drive, carried=carried))
@@ -172,7 +171,6 @@ def climb(
             some = sought(before)
             if not some:
                 break
-            told = _within(progress, step)
             # where the stem alone is put to rest, no valley of the base is missed
             hidden = len(group.stages) > 1 or not again
             deeply = group.has_stem and some is candidates and not rungs and hidden
@@ -181,13 +179,15 @@ def climb(
                 group,
                 now,
                 some,
-                told,
+                _within(progress, step),
                 deeply=deeply,
                 hastily=hastily and not rungs,
                 raced=raced if some is candidates and not rungs else (),
+                stops=stops,
             )
             first = first or runners
-            now = rebased(fitter, group, now, runners[:5])
+            with fitter.ends_at(stops):
+                now = rebased(fitter, group, now, runners[:5])
             before = leftover(fitter.residuals(now, group.signal))
             if not rungs:
                 base, base_left = now, before
@@ -199,7 +199,7 @@ def climb(
                 rung = judged(fitter, group, now, before, runners)
             if rung is None or rung.effect not in {each.effect for each in sought(before)}:
                 break
-            with suppress(*stops):  # an end here leaves the name as it is
+            with fitter.ends_at(stops):  # an end here leaves the name as it is
                 rung = _with(fitter, group, rung, on_other_side(fitter, group, rung.valve))
                 rung = _on_time(fitter, group, rung)
             gained = rung.gains[rung.effect]
@@ -209,7 +209,9 @@ def climb(
                 guess = guess or rung
                 break
             if rungs:
-                both = reconsidered(fitter, group, base, [*rungs, rung], lightly=again)
+                both = [*rungs, rung]
+                with fitter.ends_at(stops):
+                    both = reconsidered(fitter, group, base, both, lightly=again)
                 names = [each.effect for each in both]
                 # one that does is the first, found better, or the second alone
                 needed = odds.needed(base_left, before, rung.closed, both[-1].after, names)
@@ -243,6 +245,7 @@ def climb(
             quick = [each for each in others if not each.laborious]
             candidates = quick if again and not hastily else others
         progress(1.0)
+        fitter.alive()
         complete = True
     after = before if rungs else leftover(fitter.residuals(now, group.signal))
     blurred = odds.blurred(now, fitter.bench.noise)

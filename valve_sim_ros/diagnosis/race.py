@@ -61,12 +61,34 @@ def race(
     deeply: bool = False,
     hastily: bool = False,
     raced: Sequence[Valve] = (),
+    stops: tuple[type[BaseException], ...] = (),
 ) -> list[Valve]:
     """Return valves with one more effect, best first; the better, the more refitted.
 
     `deeply` searches for the base valve anew beside the best, `hastily` leaves out effects whose
     search takes long if no other one explains nearly all. `raced` is what that ended with before.
+    After one of `stops` it is what was found until then, and no further search begins.
     """
+    found, runners = [*raced], list[Valve]()
+    with fitter.ends_at(stops):
+        runners = _run(fitter, group, valve, candidates, progress, found, deeply, hastily)
+    if not (runners or found):
+        fitter.alive()
+    return runners or sorted(found, key=by_cost)
+
+
+def _run(
+    fitter: Fitter,
+    group: Group,
+    valve: Valve,
+    candidates: Sequence[Candidate],
+    progress: Callable[[float], object],
+    found: list[Valve],
+    deeply: bool,
+    hastily: bool,
+) -> list[Valve]:
+    """Return the same to the end, while each valve that a search ends with is `found`."""
+    raced = [*found]
     seen: dict[str, tuple[float, ...]] = {}
     # without the effect a valve may have found its lags far off
     free = {each.name: each for each in fitter.unknowns(group)}
@@ -109,17 +131,21 @@ def race(
 
     def begun(candidate: Candidate) -> Valve:
         own, suited = candidate.starts(seen), candidate.suited(shown.get(candidate.effect, []))
-        return screened(fitter, candidate, group, valve, own, suited, frictions, lags, held)
+        return noted(screened(fitter, candidate, group, valve, own, suited, frictions, lags, held))
+
+    def noted(runner: Valve) -> Valve:
+        found.append(runner)
+        return runner
 
     def evolved(runner: Valve, generations: int) -> Valve:
         more = fitter.evolve(runner, fitter.problem(group, runner), generations)
-        return min(runner, more, key=by_cost)
+        return noted(min(runner, more, key=by_cost))
 
     def fitted(runner: Valve) -> Valve:
-        return fitter.fit(runner, fitter.problem(group, runner))
+        return noted(fitter.fit(runner, fitter.problem(group, runner)))
 
     def refined(runner: Valve) -> Valve:
-        return fitter.refined(runner, fitter.problem(group, runner))
+        return noted(fitter.refined(runner, fitter.problem(group, runner)))
 
     def whole(runner: Valve) -> Leftover:
         return leftover(fitter.residuals(runner, group.signal))
