@@ -7,7 +7,12 @@ import pytest
 
 from valve_sim_ros import simulate
 from valve_sim_ros.diagnosis import diagnose
+from valve_sim_ros.diagnosis.adequacy import leftover
+from valve_sim_ros.diagnosis.base_valve import find_base, starting_valve
+from valve_sim_ros.diagnosis.bench import Bench
+from valve_sim_ros.diagnosis.fitting import Fitter
 from valve_sim_ros.diagnosis.readings import bridged
+from valve_sim_ros.diagnosis.stages import groups
 from valve_sim_ros.recordings import read_recording
 
 VALVE = {'f_d1': 0.8, 'T_g1': 2.0, 'T_g2': 12.0, 'f_s': 6.0, 'f_d': 3.0}
@@ -59,6 +64,19 @@ def test_a_clean_record_that_lost_commands_is_adequate(tmp_path, ramp):
     if not ramp:
         put = np.abs(stretch.u - u)[lost & ~known] < 1e-5
         assert put.mean() > 0.8
+
+
+def test_a_lost_command_that_was_not_on_the_line_tells_nothing_of_p1(tmp_path):
+    rng = np.random.default_rng(8)
+    u = 50.0 + 30.0 * np.sin(np.arange(1500) / 20.0)
+    lost = rng.random(u.size) < 0.02
+    lost[[0, -1]] = False
+    u[np.flatnonzero(lost)[::2]] = u[np.flatnonzero(lost)[::2] - 1]  # the new one came late
+    bench = Bench([read_recording(written(tmp_path / 'late.csv', u, lost, rng))])
+    fitter, group = Fitter(bench), groups(bench.signals)[0]
+    base = find_base(fitter, group, starting_valve(bench), ())
+    left = leftover(fitter.residuals(base, 'p1'))
+    assert (left.far, base.values['f_d1']) == (0, pytest.approx(VALVE['f_d1'], abs=0.02))
 
 
 def test_a_clean_record_that_lost_whole_rows_is_adequate(tmp_path):

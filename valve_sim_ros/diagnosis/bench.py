@@ -120,15 +120,16 @@ class Bench:
     def _stretch(self, recording: Recording, part: slice) -> Stretch:
         """Return a part of a recording without a gap."""
         lost = np.array(recording.quality.lost_commands, dtype=np.intp) - part.start
-        sent, unsure = bridged(
-            np.array(recording.u[part]), lost[(lost >= 0) & (lost < part.stop - part.start)]
-        )
+        u = np.array(recording.u[part])
+        sent, unsure = bridged(u, lost[(lost >= 0) & (lost < part.stop - part.start)])
+        guessed = np.union1d(unsure - 1, np.flatnonzero(sent != u))
         time = recording.time[part] - recording.time[part][0]
         measured = {name: np.array(recording.output(name)[part]) for name in self.signals}
         if 'p1' in measured and foreseen(sent, measured['p1'], noise_of([measured['p1']]), unsure):
             sent, unsure = np.append(sent[1:], sent[-1]), np.maximum(unsure - 1, 1)
+            guessed = np.maximum(guessed - 1, 0)
         stretch = Stretch(time, sent, measured, unsure=unsure)
-        stretch.hide(unsure - 1)
+        stretch.hide(guessed)
         return stretch
 
     def run(
