@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from valve_sim_ros import simulate
-from valve_sim_ros.diagnosis import odds
+from valve_sim_ros.diagnosis import diagnose, odds
 from valve_sim_ros.diagnosis.adequacy import leftover
 from valve_sim_ros.diagnosis.base_valve import find_base, starting_valve
 from valve_sim_ros.diagnosis.bench import Bench
@@ -26,8 +26,8 @@ LAGS = {'f_d1': 1.5, 'T_g1': 6.0, 'T_g2': 1.0}
 VALVE = {**LAGS, 'f_s': 7.0, 'f_d': 4.0, 'a_1': 2700.0, 'a_2': 180.0}
 
 
-def behind_a_positioner(gain, **effects):
-    """Return a fitter, the groups, and a valve as one with a stem as measured is found."""
+def recorded(gain, **effects):
+    """Return the record of a valve whose slips come back to p1 and p2 within a sample."""
     rng = np.random.default_rng(2)
     u = np.repeat(rng.uniform(20.0, 80.0, 25), 50 * PERIOD)
     used = [LOOP, *{name.split('.')[0] for name in effects}]
@@ -35,7 +35,12 @@ def behind_a_positioner(gain, **effects):
     run = simulate(u, FINE, {**VALVE, 'effects': used, **given})
     u, p1, p2, x = (each[::PERIOD] for each in (u, run.p1, run.p2, run.x))
     noisy = (each + 0.2 * rng.standard_normal(u.size) for each in (p1, p2, x))
-    bench = Bench([Recording(FINE * PERIOD * np.arange(u.size), u, *noisy)])
+    return Recording(FINE * PERIOD * np.arange(u.size), u, *noisy)
+
+
+def behind_a_positioner(gain, **effects):
+    """Return a fitter, the groups, and a valve as one with a stem as measured is found."""
+    bench = Bench([recorded(gain, **effects)])
     fitter = Fitter(bench, phase=EARLY, drive=('p1', MODELLED))
     parts = groups(bench.signals)
     bench.before = (LOOP,)
@@ -70,3 +75,12 @@ def test_the_loop_explains_no_effect_of_the_stem():
     drive = fitter.drive
     assert closed_loop(fitter, parts, valve) is None
     assert fitter.drive == drive
+
+
+@pytest.mark.slow
+def test_behind_a_positioner_the_friction_of_the_stem_is_found():
+    found = diagnose(recorded(2.0))
+    assert found.verdict == 'missing_effect'
+    assert [each.rung.effect for each in found.effects] == [LOOP]
+    assert found.augmented.values['f_s'] == pytest.approx(VALVE['f_s'], abs=0.1)
+    assert min(gap.closed for gap in found.gaps.values()) > 0.98
