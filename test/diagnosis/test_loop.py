@@ -26,13 +26,13 @@ LAGS = {'f_d1': 1.5, 'T_g1': 6.0, 'T_g2': 1.0}
 VALVE = {**LAGS, 'f_s': 7.0, 'f_d': 4.0, 'a_1': 2700.0, 'a_2': 180.0}
 
 
-def recorded(gain, **effects):
+def recorded(gain, valve=VALVE, **effects):
     """Return the record of a valve whose slips come back to p1 and p2 within a sample."""
     rng = np.random.default_rng(2)
     u = np.repeat(rng.uniform(20.0, 80.0, 25), 50 * PERIOD)
     used = [LOOP, *{name.split('.')[0] for name in effects}]
     given = {**ANY_DRIVE, f'{LOOP}.gain': gain, **effects}
-    run = simulate(u, FINE, {**VALVE, 'effects': used, **given})
+    run = simulate(u, FINE, {**valve, 'effects': used, **given})
     u, p1, p2, x = (each[::PERIOD] for each in (u, run.p1, run.p2, run.x))
     noisy = (each + 0.2 * rng.standard_normal(u.size) for each in (p1, p2, x))
     return Recording(FINE * PERIOD * np.arange(u.size), u, *noisy)
@@ -78,9 +78,9 @@ def test_the_loop_explains_no_effect_of_the_stem():
 
 
 @pytest.mark.slow
-def test_behind_a_positioner_the_friction_of_the_stem_is_found():
-    found = diagnose(recorded(2.0))
+def test_behind_a_positioner_with_a_quick_chamber_x_is_not_unknown():
+    found = diagnose(recorded(2.0, {**VALVE, 'T_g2': 0.5}))
     assert found.verdict == 'missing_effect'
     assert [each.rung.effect for each in found.effects] == [LOOP]
     assert found.augmented.values['f_s'] == pytest.approx(VALVE['f_s'], abs=0.1)
-    assert min(gap.closed for gap in found.gaps.values()) > 0.98
+    assert min(gap.closed for gap in found.gaps.values()) > 0.9
