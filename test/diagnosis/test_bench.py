@@ -285,6 +285,18 @@ def test_a_stem_that_moves_when_the_record_begins_moves_on(first, T_g2, calibrat
     assert np.nanmax(np.abs(bench.residual(result, 'x'))) < 6.0
 
 
+@pytest.mark.parametrize('off', [-0.5, 0.0, 0.5])
+def test_a_stem_that_moves_when_the_record_begins_does_not_stop_for_its_noise(off):
+    levels = ((50, 70.0), (250, 20.0), (400, 60.0))
+    slow, truth, record = slow_valve(levels, 0.2, T_g1=12.0, T_g2=60.0, f_s=10.0)
+    bench = Bench([record.slice(0.2 * 260, np.inf)])
+    start = {f'{name}_0': truth.output(name)[260] for name in ('p1', 'p2', 'x')}
+    start['x_0'] += off  # as its first samples may have it
+    assert bench.stretches[0].speed < 0.0
+    result = bench.run(complete({**slow, **start}))
+    assert np.nanmax(np.abs(bench.residual(result, 'x'))) < 6.0
+
+
 def test_a_positioner_can_be_given_any_gain_of_the_catalogue():
     u = np.repeat([90.0, 5.0], 200)
     run = simulate(

@@ -34,10 +34,9 @@ sample must be told so much better."""
 def starting_valve(bench: Bench) -> Valve:
     """Return a valve to start from, its starting values as measured."""
     values = dict(START)
-    for index in range(len(bench.stretches)):
+    for index, stretch in enumerate(bench.stretches):
         suffix = f'.{index}' if index else ''
-        p1, p2, x = (float(v) for v in bench.start(index, values)[:3])
-        values |= {f'p1_0{suffix}': p1, f'p2_0{suffix}': p2, f'x_0{suffix}': x}
+        values |= {f'{name}_0{suffix}': value for name, value in stretch.first.items()}
     return Valve(values)
 
 

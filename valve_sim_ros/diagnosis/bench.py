@@ -55,9 +55,10 @@ part of the friction: a stem that is nearly free always begins to slip; and how 
 where the stem is put to rest: the moment of each slip says little there."""
 STEP = 4.0
 """Where p1 moves by more within a sample it steps [noise]."""
+UNSURE = 3.0
+"""By so much a stem that moves when its record begins may be put back [noise]."""
 APART = {SOON: 3.0, CAUGHT: 6.0, ON_TIME: 6.0}
 """By drive: a stem is caught where it is further than this from where it should rest [noise]."""
-
 SWINGS = 0.7
 """What a signal does from sample to sample is a swing if there is less between the lines of its
 spectrum than this part of it."""
@@ -237,13 +238,16 @@ class Bench:
 
     def start(self, index: int, values: Mapping[str, float], effects: Sequence[str] = ()) -> Array:
         """Return the state before a stretch: as fitted, else as first measured."""
-        suffix = f'.{index}' if index else ''
-        first = self.stretches[index].first
+        suffix, first = f'.{index}' if index else '', self.stretches[index].first
         p1, p2, x = (values.get(f'{name}_0{suffix}', first[name]) for name in OUTPUTS)
+        v = self.stretches[index].speed
         if CALIBRATION.id in effects:
             x = place(x, *(values[f'{CALIBRATION.id}.{name}'] for name in ('zero', 'span')))
-        v = self.stretches[index].speed
-        return np.array([p1, p2, x, v, np.sign(v), abs(np.sign(v)), p1, p1, 0.0])
+        way = float(np.sign(v))
+        # further on than kinetic friction lets one go that moves, it would stop for its noise alone
+        glides = p2 - way * values['f_d'] - v / values['a_1/a_2']
+        x -= way * min(max(way * (x - glides), 0.0), UNSURE * self.noise.get('x', 0.0))
+        return np.array([p1, p2, x, v, way, abs(way), p1, p1, 0.0])
 
     def residual(self, results: Sequence[Array], name: str) -> Array:
         """Return measured minus model of a signal over its noise, NaN where not counted.
