@@ -115,12 +115,13 @@ def quick_exhaust(rng: Rng, valve: Physics, length: float) -> Changes:
 
 
 def rate_limit(rng: Rng, valve: Physics, length: float) -> Changes:
-    """Limit the speed of p2, both ways or one, or of the stem by direction."""
-    rate = log_uniform(rng, 1.0, 30.0)
-    if rng.random() < 0.6:
-        ways = ('p2_rate_up', 'p2_rate_down')
-        return dict.fromkeys(ways if rng.random() < 0.5 else (str(rng.choice(ways)),), rate)
-    return {'v_up': rate, 'v_down': rate * log_uniform(rng, 0.4, 2.5)}
+    """Limit the speed of p2, both ways or one, or by direction, or that of the stem so."""
+    rate, kind = log_uniform(rng, 1.0, 30.0), rng.random()
+    other = rate * log_uniform(rng, 0.4, 2.5)
+    ways = ('p2_rate_up', 'p2_rate_down')
+    if kind < 0.4:
+        return dict.fromkeys(ways if kind < 0.2 else (str(rng.choice(ways)),), rate)
+    return dict(zip(ways if kind < 0.6 else ('v_up', 'v_down'), (rate, other), strict=True))
 
 
 def hysteresis(rng: Rng, valve: Physics, length: float) -> Changes:

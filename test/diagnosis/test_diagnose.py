@@ -7,6 +7,7 @@ import json
 from click.testing import CliRunner
 import numpy as np
 import pytest
+from valves import recording
 
 from blind import sets
 from valve_sim_ros import (
@@ -51,6 +52,19 @@ def test_the_hidden_effect_is_named(small_set, number):
     twins = [twin for effect in found['effects'] for twin in effect['indistinguishable_from']]
     assert named == key['effects'] or set(key['effects']) <= set(twins)
     assert found['verdict'] == ('missing_effect' if key['effects'] else 'adequate')
+
+
+@pytest.mark.slow
+def test_a_chamber_that_may_fill_and_empty_only_so_fast_is_named():
+    limits = {'pressure_rate': 1000.0, 'filling_rate': 6.0, 'emptying_rate': 3.0}
+    record = recording(0.2, **{f'rate_limit.{name}': rate for name, rate in limits.items()})
+    found = diagnose(Recording(record.time, record.u, record.p1, record.p2))
+    assert found.verdict == 'missing_effect'
+    (named,) = found.as_json()['effects']
+    assert named['id'] == 'rate_limit'
+    rates = {name: each['value'] for name, each in named['parameters'].items()}
+    assert rates['filling_rate'] == pytest.approx(6.0, rel=0.05)
+    assert rates['emptying_rate'] == pytest.approx(3.0, rel=0.05)
 
 
 @pytest.mark.slow

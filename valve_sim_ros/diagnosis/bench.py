@@ -244,7 +244,7 @@ class Bench:
         if CALIBRATION.id in effects:
             x = place(x, *(values[f'{CALIBRATION.id}.{name}'] for name in ('zero', 'span')))
         way = float(np.sign(v))
-        # further on than kinetic friction lets one go that moves, it would stop for its noise alone
+        # further on than kinetic friction lets one that moves, it would stop for its noise alone
         glides = p2 - way * values['f_d'] - v / values['a_1/a_2']
         x -= way * min(max(way * (x - glides), 0.0), UNSURE * self.noise.get('x', 0.0))
         return np.array([p1, p2, x, v, way, abs(way), p1, p1, 0.0])

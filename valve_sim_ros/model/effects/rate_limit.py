@@ -115,6 +115,7 @@ EFFECT = Effect(
         ('pressure_rate',),
         ('filling_rate',),
         ('emptying_rate',),
+        ('filling_rate', 'emptying_rate'),
         ('opening_rate', 'closing_rate'),
     ),
     explanation='A restriction, a damper or a small booster limits how fast p2 or the stem moves.',
