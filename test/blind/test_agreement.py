@@ -236,3 +236,17 @@ def test_that_an_effect_agrees(effect, changes, values):
     left = disagreement(blind, modelled)
     assert left < 0.3
     assert left < 0.2 * disagreement(blind, plain)
+
+
+def test_that_friction_along_the_stroke_agrees_for_a_stem_that_overshoots():
+    """Its slips are over within a few steps: each must take the friction of its own middle."""
+    quick = VALVE | {'a_1': 944.0, 'a_2': 35.0}
+    slope = 2.5  # from the closed end; the model's is from mid stroke
+    middle = 1.0 + 0.5 * slope
+    friction = {name: VALVE[name] * middle for name in ('f_s', 'f_d')}
+    effect = 'position_dependent_friction'
+    own = {f'{effect}.slope': 0.5 * slope / middle, f'{effect}.height': 0.0}
+    blind, modelled = both(
+        quick | {'friction_slope': slope}, quick | friction | {'effects': [effect]} | own
+    )
+    assert disagreement(blind, modelled) < 0.1

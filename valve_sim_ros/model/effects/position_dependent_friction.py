@@ -13,11 +13,12 @@ from ..stem import Friction
 
 @njit
 def force(value: Any, state: Any, p: Any, memory: Any, dt: float) -> tuple[float, Friction]:
-    """Return friction times 1 + slope + bump at the stem's place."""
+    """Return friction times 1 + slope + bump at the stem's place halfway through the step."""
     offset, f = value
     slope, height, centre, width = p
-    away = (state.x - centre) / width
-    factor = 1.0 + slope * (state.x - 50.0) / 50.0 + height * math.exp(-0.5 * away * away)
+    x = state.x + 0.5 * dt * state.v
+    away = (x - centre) / width
+    factor = 1.0 + slope * (x - 50.0) / 50.0 + height * math.exp(-0.5 * away * away)
     factor = max(factor, 0.02)
     return offset, Friction(
         f.static_up * factor,
