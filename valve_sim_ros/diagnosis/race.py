@@ -11,13 +11,12 @@ import os
 import numpy as np
 from scipy.signal import periodogram
 
-from ..model.effects import CATALOGUE
 from ..model.pipeline import Array
 from . import odds
 from .adequacy import Leftover, leftover
 from .alike import alike
 from .base_valve import find_base
-from .fitting import by_cost, FAINT, Fitter, Valve
+from .fitting import by_cost, FAINT, Fitter, GENERATIONS, NARROW, Valve
 from .screening import Bases, screened
 from .seen import (
     calibration_seen,
@@ -184,7 +183,11 @@ def _run(
             return not group.has_stem or gained >= PROMISING * gap
 
         def heat(
-            ahead: list[Valve], some: Sequence[Candidate], *, last: bool = False
+            ahead: list[Valve],
+            some: Sequence[Candidate],
+            begun: Callable[[Candidate], Valve] = begun,
+            *,
+            last: bool = False,
         ) -> list[Valve]:
             """Return the runners with some more, which are refitted as far as they lead.
 
@@ -216,7 +219,7 @@ def _run(
             return odds.nearly_all(before, whole(best))
 
         quick, imitated, slow = (
-            [each for each in candidates if _tier(each) == tier] for tier in range(3)
+            [each for each in candidates if each.tier == tier] for tier in range(3)
         )
         if raced:
             runners, waiting = ([*raced], []) if promising(raced) else ([], [*raced])
@@ -245,12 +248,21 @@ def _run(
         elif ended and left < (odds.CLEAN if valve.candidates else FAINT):
             slow = [e for e in slow if e in hidden or not e.laborious]
         # a law with one more parameter is tried only where the plain one leaves something
-        further = [e for e in slow if group.has_stem and _extends(e, slow)]
+        further = [e for e in slow if group.has_stem and e.extends(slow)]
         runners = heat(runners, [e for e in slow if e not in further], last=not further)
+        led = begun
         if runners:
-            plain = runners[0].candidates[-1] in slow and excess(runners[0]) <= odds.SPOTLESS
-            further = [] if plain or nearly_all(runners[0]) else further
-        runners = heat(runners, further, last=True)
+            plain = runners[0]
+            law = plain.candidates[-1]
+            if nearly_all(plain) or (law in slow and excess(plain) <= odds.SPOTLESS):
+                further = []
+            elif law in slow and before.closed_by(whole(plain)) >= odds.MOSTLY:
+                further = [e for e in further if e.effect == law.effect]
+
+                def led(candidate: Candidate) -> Valve:
+                    return noted(_carried_on(fitter, group, plain, candidate))
+
+        runners = heat(runners, further, led, last=True)
         if deeply:
             runners = _deepened(fitter, group, valve, runners, slow, progress)
     return alike(fitter, group, runners)
@@ -261,18 +273,10 @@ def _shifted(candidate: Candidate) -> bool:
     return candidate.effect == odds.COARSE and 'offset' in candidate.names
 
 
-def _extends(candidate: Candidate, others: Sequence[Candidate]) -> bool:
-    """Tell whether it is another one of the same effect with more parameters."""
-    same = [each for each in others if each.effect == candidate.effect]
-    return any({*each.names} < {*candidate.names} for each in same)
-
-
-def _tier(candidate: Candidate) -> int:
-    """Return how late one is tried: a search for one takes many times as long as for another."""
-    declared = CATALOGUE[candidate.effect]
-    if candidate.laborious or declared.rugged:
-        return 2
-    return 1 if declared.imitated else 0
+def _carried_on(fitter: Fitter, group: Group, plain: Valve, candidate: Candidate) -> Valve:
+    """Return a valve with a law that has one more parameter, begun from the plain one."""
+    there = replace(plain, candidates=(*plain.candidates[:-1], candidate))
+    return fitter.evolve(there, fitter.problem(group, there), GENERATIONS, NARROW)
 
 
 def in_reach(valve: Valve, runners: Sequence[Valve]) -> list[Valve]:

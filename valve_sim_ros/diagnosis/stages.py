@@ -47,6 +47,19 @@ class Candidate:
         return effect.laborious and not {*self.names} <= {*effect.light}
 
     @property
+    def tier(self) -> int:
+        """How late it is tried: a search for one takes many times as long as for another."""
+        declared = CATALOGUE[self.effect]
+        if self.laborious or declared.rugged:
+            return 2
+        return 1 if declared.imitated else 0
+
+    def extends(self, others: Iterable['Candidate']) -> bool:
+        """Tell whether it is the law of one of the others with more parameters."""
+        same = [each for each in others if each.effect == self.effect]
+        return any({*each.names} < {*self.names} for each in same)
+
+    @property
     def places(self) -> int:
         """Number of places in which a search looks for it."""
         return math.prod(len(starts_of(declared(self.effect, name))) for name in self.names)
