@@ -18,7 +18,7 @@ def either_sign(rng: np.random.Generator, low: float, high: float) -> float:
 
 
 def base_valve(rng: np.random.Generator) -> Physics:
-    """Return a random valve; nine of ten stems do not overshoot."""
+    """Return a random valve; nine of ten stems do not overshoot, three stop before the others."""
     friction = rng.uniform(2.0, 12.0)
     slow = rng.random() < 0.12
     while True:
@@ -34,4 +34,5 @@ def base_valve(rng: np.random.Generator) -> Physics:
         f_d=friction * rng.uniform(0.3, 0.9),
         a_1=stiffness,
         a_2=stiffness / rate,
+        delta=log_uniform(rng, 1e-4, 0.1) if rng.random() < 0.3 else 1e-5,
     )

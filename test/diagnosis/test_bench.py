@@ -297,6 +297,17 @@ def test_a_stem_that_moves_when_the_record_begins_does_not_stop_for_its_noise(of
     assert np.nanmax(np.abs(bench.residual(result, 'x'))) < 6.0
 
 
+def test_a_stem_that_slips_when_the_record_begins_is_put_where_it_comes_to_rest():
+    levels = ((50, 20.0), (300, 30.7), (300, 27.0), (300, 60.0))
+    slow, truth, record = slow_valve(levels, 0.2, T_g1=12.0, T_g2=60.0, f_s=10.0)
+    slip = int(np.argmax(np.abs(np.diff(truth.x)) > 1.0))
+    assert abs(truth.x[slip + 2] - truth.x[slip]) > 3.0
+    bench = Bench([record.slice(0.2 * slip, np.inf)])
+    start = {f'{name}_0': truth.output(name)[slip] for name in ('p1', 'p2', 'x')}
+    result = bench.run(complete({**slow, **start, 'x_0': start['x_0'] + 3.0}))
+    assert np.nanmax(np.abs(bench.residual(result, 'x'))) < 6.0
+
+
 def test_a_positioner_can_be_given_any_gain_of_the_catalogue():
     u = np.repeat([90.0, 5.0], 200)
     run = simulate(

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from valves import recording, slow_valve, VALUES
 
+from valve_sim_ros import diagnose, simulate
 from valve_sim_ros.diagnosis import odds
 from valve_sim_ros.diagnosis.adequacy import but_one_slip, leftover
 from valve_sim_ros.diagnosis.base_valve import find_base, on_time, starting_valve
@@ -288,3 +289,24 @@ def test_a_race_that_is_stopped_ends_with_what_was_found_until_then():
         fitter.fit(best, fitter.problem(group, best))
     with pytest.raises(Stop):
         race(fitter, group, base, candidates, stops=(Stop,))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize('delta', [0.04, 0.0984])
+def test_a_stem_that_stops_at_another_speed_is_no_effect(delta):
+    """It stops while p2 still goes on, and a further step the same way finds it at rest."""
+    rng = np.random.default_rng(11)
+    u = np.concatenate(
+        [np.full(40, 10.0), np.repeat(10.0 + np.cumsum(rng.uniform(3, 9, 12)), 120)]
+    )
+    u = np.concatenate([u, u[::-1]])
+    values = {n: v for n, v in complete(VALUES).items() if '/' not in n}
+    values = {n: v for n, v in values.items() if n not in ('phase', 'damping')}
+    valve = {**values, 'f_s': 6.0, 'f_d': 3.0, 'T_g1': 9.0, 'T_g2': 12.0, 'delta': delta}
+    run = simulate(u, parameters=valve)
+    p1, p2, x = (values + 0.2 * rng.standard_normal(u.size) for values in (run.p1, run.p2, run.x))
+    found = diagnose(Recording(run.t, u, p1, p2, x))
+    assert found.verdict == 'adequate'
+    assert found.base.values['delta'] == pytest.approx(delta, rel=0.3)
+    printed = simulate(u, parameters={**found.base.values, 'delta': 1e-5})
+    assert np.abs(printed.x - run.x).max() > 1.0

@@ -9,12 +9,13 @@ from . import odds
 from .adequacy import Leftover, leftover
 from .arrivals import put_in_its_period
 from .bench import Bench, MIXED_JITTER
-from .fitting import by_cost, eased, FINE, Fitter, NARROW, PATIENT, Problem, SHORT, Valve
+from .fitting import by_cost, eased, FAINT, FINE, Fitter, NARROW, PATIENT, Problem, SHORT, Valve
 from .seen import friction_seen, mixed_arrivals
 from .single_slips import slip_by_slip
 from .stages import Group
 from .starts import friction_grid, grid, nearby, START, STEMS, SWEEP
-from .unknowns import BLEND, EARLY, LATE, LEAD, PHASE, Unknown
+from .stretch import PUT_TO_REST
+from .unknowns import BLEND, EARLY, LATE, LEAD, PHASE, STANDSTILL, Unknown
 
 FEW_STARTS = 3
 """So many starts are followed."""
@@ -26,6 +27,8 @@ NEARLY = 0.95
 """Phase beyond which a command acts nearly a whole period late or early."""
 SHARES = (0.1, 0.3, 0.5, 0.7, 0.9)
 """Parts of a period by which commands that go on and on may be late, or sooner than steps."""
+SPEEDS = (1e-3, 5e-3, 0.02, 0.08)
+"""Where a search for the speed at which a stem stops begins [%/s]."""
 LAG, CLEARLY = 'ip_lag', 50.0
 """An answer that lags may have gone less than half the way where it is first seen: with it that
 sample must be told so much better."""
@@ -91,7 +94,8 @@ def find_base(
     if not group.has_stem:
         best = fitter.refined(found[0], problem)
         if group.stages == ('u-p1',):
-            return _late_on_ramps(fitter, group, best, drive)
+            # samples of ramps say where those were then, not where they stayed until the next one
+            return with_nuisance(fitter, best, BLEND, problem)
         best = ahead_on_ramps(fitter, group, best, problem)
         problem = (fitter.unknowns(group), *problem[1:])
         return put_in_its_period(fitter, group, best, problem)
@@ -101,9 +105,16 @@ def find_base(
     best = fitter.fit(found[0], problem)
     left = leftover(fitter.residuals(best, group.signal, drive))
     smeared = len(group.stages) > 1 and left.mean_square > odds.COLOURED  # no window is quiet
-    worth = odds.suspicious(left, group, fitter.bench.mixed) and not odds.carried_on(left, carried)
-    if not (closely or smeared or worth):
+
+    def worth(left: Leftover) -> bool:
+        suspicious = odds.suspicious(left, group, fitter.bench.mixed)
+        return suspicious and not odds.carried_on(left, carried)
+
+    if not (closely or smeared or worth(left)):
         return best
+    stopping = standing_still(fitter, best, problem, found)
+    if stopping is not best:
+        return stopping
     # caught where it is far from its rest, a stem that slips too late is only a little wrong
     way = eased(problem)[0]
     if len(group.stages) == 1 and way != problem:
@@ -119,20 +130,36 @@ def find_base(
     found += [fitter.fit(each, problem) for each in rested]
     found = sorted(found, key=by_cost)[:FOLLOWED]
     found += [fitter.evolve(each, problem, GENERATIONS, NARROW) for each in found]
-    return fitter.refined(min(found, key=by_cost), problem)
+    return standing_still(fitter, fitter.refined(min(found, key=by_cost), problem), problem)
 
 
-def _late_on_ramps(fitter: Fitter, group: Group, valve: Valve, drive: Sequence[str]) -> Valve:
-    """Return a valve that commands which go on and on reach late by a part of a period.
+def standing_still(
+    fitter: Fitter, valve: Valve, problem: Problem, others: Sequence[Valve] = ()
+) -> Valve:
+    """Return a valve whose stem stops at another speed than is printed, if that is all it lacks.
 
-    Samples of them say where they were then, not where they stayed until the next one.
+    Where p2 goes on slowly it stops that much sooner, and leaves by a slip. What would leave more
+    than noise might only imitate an effect; one that is put to rest does not tell. All searches
+    vary the speed from then on; it is also sought from the `others`.
     """
-    fitter.blend = True
-    late = _with_nuisance(
-        fitter, valve, BLEND, (fitter.unknowns(group), group.signal, tuple(drive))
-    )
-    fitter.blend = late is not valve
-    return late
+    unknowns, signal, drive = problem
+    if signal != 'x' or PUT_TO_REST & {*drive} or STANDSTILL in fitter.nuisances:
+        return valve
+    before = leftover(fitter.residuals(valve, signal, drive))
+    if before.excess <= FAINT:
+        return valve
+    problem = ((*unknowns, STANDSTILL), signal, drive)
+    each = [
+        [{**one.values, STANDSTILL.name: speed} for one in (valve, *others)] for speed in SPEEDS
+    ]
+    found = [fitter.fit(fitter.scan(valve, some, problem)[0], problem) for some in each]
+    better = min(found, key=by_cost)
+    after = leftover(fitter.residuals(better, signal, drive))
+    clearly = before.closed_by(after) >= odds.LEAST_CLOSED and after.excess <= odds.SPOTLESS
+    if not (clearly and _better(valve, better, after)):
+        return valve
+    fitter.nuisances |= {STANDSTILL}
+    return better
 
 
 def ahead_on_ramps(fitter: Fitter, group: Group, valve: Valve, problem: Problem) -> Valve:
@@ -140,22 +167,31 @@ def ahead_on_ramps(fitter: Fitter, group: Group, valve: Valve, problem: Problem)
 
     Held until the next sample they would be late by half a period; steps are not.
     """
-    if fitter.lead or group.signal != 'p2' or fitter.phase is LATE or 'p1' in problem[2]:
+    if group.signal != 'p2' or fitter.phase is LATE or 'p1' in problem[2]:
         return valve
-    fitter.lead = True
-    ahead = _with_nuisance(fitter, valve, LEAD, ((*problem[0], LEAD), *problem[1:]))
-    fitter.lead = ahead is not valve
-    return ahead
+    return with_nuisance(fitter, valve, LEAD, problem)
 
 
-def _with_nuisance(fitter: Fitter, valve: Valve, nuisance: Unknown, problem: Problem) -> Valve:
-    """Return a valve with one more unknown of the commands if that is clearly better."""
+def with_nuisance(fitter: Fitter, valve: Valve, nuisance: Unknown, problem: Problem) -> Valve:
+    """Return a valve with one more unknown of the commands if that is clearly better.
+
+    All searches vary it from then on.
+    """
+    if nuisance in fitter.nuisances:
+        return valve
+    problem = ((*problem[0], nuisance), *problem[1:])
     starts = [{**valve.values, nuisance.name: share} for share in SHARES]
     found = [fitter.fit(each, problem) for each in fitter.scan(valve, starts, problem, 2)]
     better = min(found, key=by_cost)
-    worth = leftover(fitter.residuals(better, *problem[1:])).worth
-    clearly = 0.5 * (valve.cost - better.cost) / worth >= odds.TWIN_GAIN
-    return better if clearly else valve
+    if not _better(valve, better, leftover(fitter.residuals(better, *problem[1:]))):
+        return valve
+    fitter.nuisances |= {nuisance}
+    return better
+
+
+def _better(valve: Valve, other: Valve, left: Leftover) -> bool:
+    """Tell whether another valve, which leaves so much, is clearly better."""
+    return 0.5 * (valve.cost - other.cost) / left.worth >= odds.TWIN_GAIN
 
 
 def _along_the_valley(fitter: Fitter, valve: Valve, problem: Problem) -> list[Valve]:
@@ -227,7 +263,7 @@ def _settle_phase(fitter: Fitter, group: Group, valve: Valve) -> None:
         starts = [{**values, **own, **there} for own in added for there in points]
         return fitter.fit(fitter.scan(kind, starts, problem)[0], problem, SHORT)
 
-    fitter.blend = fitter.lead = False
+    fitter.nuisances = frozenset()
     early, late = (fitted(valve, [{}], phase) for phase in (EARLY, LATE))
     lags_early, lags_late = (fitted(lagging, lag.starts({}), phase) for phase in (EARLY, LATE))
     # a lag of 0 is none: the search with one may have ended elsewhere

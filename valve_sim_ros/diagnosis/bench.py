@@ -13,7 +13,6 @@ from ..model.composition import compose
 from ..model.effects.sensor_calibration import EFFECT as CALIBRATION
 from ..model.effects.sensor_calibration import place
 from ..model.kernels import scored
-from ..model.parameters import DELTA
 from ..model.pipeline import Array
 from ..model.scoring import BESIDE
 from ..recordings.recording import OUTPUTS, Recording
@@ -24,6 +23,7 @@ from .readings import (
     between_lines,
     bridged,
     coarse_grid,
+    FEW,
     filled,
     foreseen,
     grids_kept,
@@ -33,6 +33,7 @@ from .readings import (
     smooth,
     still,
     straightened,
+    travelled,
     wild,
 )
 from .stretch import CAUGHT, FINELY, Grid, HELD, MODELLED, ON_TIME, RESTS, SOON, Stretch
@@ -93,8 +94,10 @@ class Bench:
                 values[wild(values, OUTLIER * self.noise[name])] = np.nan
             stretch.noise = {n: self._uncertainty(n, v) for n, v in stretch.measured.items()}
             samples = np.arange(stretch.u.size)
-            travelled = self._travelled(stretch.measured[self.signals[-1]], TRAVEL) + 10
-            settled = samples >= min(travelled, int(MOST_UNSETTLED * samples.size))
+            # plays and friction forget what was before the record as the valve travels
+            last, surely = self.signals[-1], OUTLIER * self.noise[self.signals[-1]]
+            first = travelled(stretch.measured[last], max(TRAVEL, surely)) + 10
+            settled = samples >= min(first, int(MOST_UNSETTLED * samples.size))
             stretch.recount({n: np.where(settled, v, np.nan) for n, v in stretch.measured.items()})
             if 'p1' in self.signals:
                 whole, noise = filled(stretch.measured['p1']), self.noise['p1']
@@ -107,10 +110,13 @@ class Bench:
                 rests, smoothed = still(whole, noise), smooth(whole, noise)
                 stretch.held = straightened(whole, stretch.u, noise)
                 stretch.rests = np.where(rests, smoothed, np.nan)
-                departed = self._travelled(stretch.held, 0.0) or samples.size
+                departed = travelled(stretch.held, surely) or samples.size
                 period = float(np.median(np.diff(stretch.time)))
                 stretch.speed = pace(whole, departed, noise) / period
                 if not stretch.speed:  # one that creeps seems to rest
+                    if departed < FEW:  # it begins within a slip and rests only then
+                        rest = departed + FEW
+                        departed = rest + (travelled(stretch.held[rest:], surely) or samples.size)
                     # a first slip that was seen on its way must not be put to rest there
                     seen = samples < departed - REST
                     stretch.begins['x'] = np.where(seen, stretch.rests, np.nan)
@@ -189,7 +195,7 @@ class Bench:
         if MODELLED in drive:
             effects = [effect for effect in effects if effect not in self.before]
         composition = compose(effects, values)
-        theta = np.array([*(values[name] for name in THETA), DELTA.default, 0.0])
+        theta = np.array([*(values[name] for name in THETA), 0.0])
         if HELD in drive:
             theta[STUCK] = IMMENSE
         outputs = np.empty((BESIDE + 1, grid.u.size))
@@ -246,7 +252,8 @@ class Bench:
         way = float(np.sign(v))
         # further on than kinetic friction lets one that moves, it would stop for its noise alone
         glides = p2 - way * values['f_d'] - v / values['a_1/a_2']
-        x -= way * min(max(way * (x - glides), 0.0), UNSURE * self.noise.get('x', 0.0))
+        if 0.0 < way * (x - glides) < UNSURE * self.noise.get('x', 0.0):
+            x = glides
         return np.array([p1, p2, x, v, way, abs(way), p1, p1, 0.0])
 
     def residual(self, results: Sequence[Array], name: str) -> Array:
@@ -325,18 +332,6 @@ class Bench:
         """Return how far p1 moves up to each sample of a result [%], shape (n,)."""
         return np.abs(np.diff(result[0], prepend=result[0, :1]))
 
-    def _travelled(self, values: Array, far: float) -> int:
-        """Return the first sample by which values of the last signal are `far` away; 0 if none is.
-
-        Plays and friction forget the unknown state before the record as the valve travels.
-        """
-        known = np.flatnonzero(np.isfinite(values))
-        if not known.size:
-            return 0
-        far = max(far, OUTLIER * self.noise[self.signals[-1]])
-        moved = np.abs(values[known] - values[known[0]]) > far
-        return int(known[np.argmax(moved)]) if moved.any() else 0
-
     @property
     def range_of_u(self) -> tuple[float, float]:
         """Lowest and highest command [% of span]."""
@@ -344,7 +339,7 @@ class Bench:
         return float(u.min()), float(u.max())
 
 
-THETA = ('f_d1', 'T_g1', 'T_g2', 'f_s', 'f_d', 'a_1', 'a_2')
+THETA = ('f_d1', 'T_g1', 'T_g2', 'f_s', 'f_d', 'a_1', 'a_2', 'delta')
 
 STUCK, IMMENSE = [THETA.index('f_s'), THETA.index('f_d')], 1e9
 """Friction of a stem that moves only where it is put [% of span]."""

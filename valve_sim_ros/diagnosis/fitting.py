@@ -17,7 +17,16 @@ from .descent import descend, walk
 from .evolution import evolve
 from .stages import Candidate, Group
 from .stretch import CAUGHT, ON_TIME, PUT_TO_REST
-from .unknowns import BLEND, complete, LEAD, PHASE, to_point, to_values, Unknown
+from .unknowns import (
+    BLEND,
+    complete,
+    LEAD,
+    PHASE,
+    STANDSTILL,
+    to_point,
+    to_values,
+    Unknown,
+)
 from .workers import cheapest
 
 HOPELESS = 1e3
@@ -86,8 +95,7 @@ class Fitter:
 
     bench: Bench
     phase: Unknown = PHASE
-    blend: bool = False
-    lead: bool = False
+    nuisances: frozenset[Unknown] = frozenset()
     drive: tuple[str, ...] = ()
     seed: int = 0
     alive: Callable[[], object] = go_on
@@ -102,9 +110,13 @@ class Fitter:
 
     def unknowns(self, group: Group) -> tuple[Unknown, ...]:
         """Return what a fit of the base valve varies in a group."""
-        own = (BLEND,) if self.blend and group.stages == ('u-p1',) else ()
-        ahead = (LEAD,) if self.lead and group.signal == 'p2' else ()
-        return (*group.unknowns(len(self.bench.stretches), self.phase), *own, *ahead)
+        here = {
+            BLEND: group.stages == ('u-p1',),
+            LEAD: group.signal == 'p2',
+            STANDSTILL: group.has_stem,
+        }
+        own = (each for each in here if here[each] and each in self.nuisances)
+        return (*group.unknowns(len(self.bench.stretches), self.phase), *own)
 
     def results(self, valve: Valve, drive: Sequence[str] | None = None) -> list[Array]:
         """Return what `Bench.run` makes of a valve, driven as is usual here unless told."""

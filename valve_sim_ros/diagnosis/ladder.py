@@ -10,7 +10,7 @@ from ..model.effects import CATALOGUE
 from . import odds
 from .adequacy import but_one_slip, Leftover, leftover
 from .arrivals import put_in_its_period
-from .base_valve import ahead_on_ramps, find_base, on_other_side, on_time
+from .base_valve import ahead_on_ramps, find_base, on_other_side, on_time, standing_still
 from .fitting import by_cost, Fitter, Valve
 from .loosening import loosened
 from .race import race, rebased
@@ -248,7 +248,6 @@ def climb(
         fitter.alive()
         complete = True
     after = before if rungs else leftover(fitter.residuals(now, group.signal))
-    blurred = odds.blurred(now, fitter.bench.noise)
     return Ladder(
         group,
         'adequate',
@@ -259,7 +258,7 @@ def climb(
         tuple(rungs),
         guess,
         complete,
-        blurred,
+        odds.blurred(now, fitter.bench.noise),
         tuple(first),
     )
 
@@ -267,6 +266,7 @@ def climb(
 def _on_time(fitter: Fitter, group: Group, rung: Rung) -> Rung:
     """Return a step with commands where its valve shows that they came."""
     valve = ahead_on_ramps(fitter, group, rung.valve, fitter.problem(group, rung.valve))
+    valve = standing_still(fitter, valve, fitter.problem(group, valve))
     valve = put_in_its_period(fitter, group, valve, fitter.problem(group, valve))
     return _with(fitter, group, rung, valve)
 

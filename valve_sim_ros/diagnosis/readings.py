@@ -150,6 +150,13 @@ def pace(x: Array, departed: int, noise: float) -> float:
     return 0.0 if bent or abs(slope) * departed <= CREEPS * noise else float(slope)
 
 
+def travelled(values: Array, far: float) -> int:
+    """Return the first sample by which a signal is `far` from where it began; 0 if none is."""
+    known = np.flatnonzero(np.isfinite(values))
+    moved = np.abs(values[known] - values[known[:1]]) > far
+    return int(known[np.argmax(moved)]) if moved.any() else 0
+
+
 def wild(values: Array, limit: float) -> Mask:
     """Return which single values lie further than `limit` from neighbours that agree."""
     wild = np.zeros(values.size, dtype=bool)

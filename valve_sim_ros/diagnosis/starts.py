@@ -8,6 +8,7 @@ from itertools import product
 import numpy as np
 from scipy.stats import qmc
 
+from ..model.parameters import DELTA
 from .unknowns import Unknown
 
 START: dict[str, float] = {
@@ -21,6 +22,7 @@ START: dict[str, float] = {
     'phase': 0.0,
     'blend': 0.0,
     'lead': 0.0,
+    'delta': DELTA.default,
 }
 GRID: dict[str, tuple[float, ...]] = {
     'f_d1': (0.1, 0.5, 1.5, 4.0),

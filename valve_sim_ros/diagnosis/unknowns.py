@@ -11,7 +11,7 @@ import numpy as np
 
 from ..model.declarations import EffectParameter
 from ..model.effects import CATALOGUE
-from ..model.parameters import BASE
+from ..model.parameters import BASE, DELTA
 from ..model.pipeline import Array
 
 DECLARED = {parameter.name: parameter for parameter in BASE}
@@ -69,6 +69,8 @@ BLEND = Unknown('blend', 0.0, 0.999, 'linear', 0.1)
 """Share of a period by which a command that goes on and on reaches p1 late."""
 LEAD = Unknown('lead', 0.0, 0.999, 'linear', 0.1)
 """Share of a period by which its changes come sooner than steps: it goes on between samples."""
+STANDSTILL = _log(DELTA.name, DELTA.default, 0.15, 0.3)
+"""Speed below which the stem stops, far more in some valves than is printed in eq. (9) [%/s]."""
 
 
 def start_of(name: str) -> Unknown:
@@ -99,6 +101,7 @@ def complete(values: Mapping[str, float]) -> dict[str, float]:
     ratio = values['a_1/a_2']
     a_1 = (2.0 * values['damping'] * ratio) ** 2
     return {
+        DELTA.name: DELTA.default,
         **values,
         'f_d': values['f_s'] * values['f_d/f_s'],
         'a_1': a_1,
