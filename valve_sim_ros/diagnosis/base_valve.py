@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The search for the base valve, with effects in force or without."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 from . import odds
@@ -95,7 +95,7 @@ def find_base(
         best = fitter.refined(found[0], problem)
         if group.stages == ('u-p1',):
             # samples of ramps say where those were then, not where they stayed until the next one
-            return with_nuisance(fitter, best, BLEND, problem)
+            return with_nuisance(fitter, [best], BLEND, SHARES, problem)
         best = ahead_on_ramps(fitter, group, best, problem)
         problem = (fitter.unknowns(group), *problem[1:])
         return put_in_its_period(fitter, group, best, problem)
@@ -142,24 +142,17 @@ def standing_still(
     than noise might only imitate an effect; one that is put to rest does not tell. All searches
     vary the speed from then on; it is also sought from the `others`.
     """
-    unknowns, signal, drive = problem
-    if signal != 'x' or PUT_TO_REST & {*drive} or STANDSTILL in fitter.nuisances:
+    _, signal, drive = problem
+    if signal != 'x' or PUT_TO_REST & {*drive}:
         return valve
     before = leftover(fitter.residuals(valve, signal, drive))
     if before.excess <= FAINT:
         return valve
-    problem = ((*unknowns, STANDSTILL), signal, drive)
-    each = [
-        [{**one.values, STANDSTILL.name: speed} for one in (valve, *others)] for speed in SPEEDS
-    ]
-    found = [fitter.fit(fitter.scan(valve, some, problem)[0], problem) for some in each]
-    better = min(found, key=by_cost)
-    after = leftover(fitter.residuals(better, signal, drive))
-    clearly = before.closed_by(after) >= odds.LEAST_CLOSED and after.excess <= odds.SPOTLESS
-    if not (clearly and _better(valve, better, after)):
-        return valve
-    fitter.nuisances |= {STANDSTILL}
-    return better
+
+    def explains(after: Leftover) -> bool:
+        return before.closed_by(after) >= odds.LEAST_CLOSED and after.excess <= odds.SPOTLESS
+
+    return with_nuisance(fitter, [valve, *others], STANDSTILL, SPEEDS, problem, explains)
 
 
 def ahead_on_ramps(fitter: Fitter, group: Group, valve: Valve, problem: Problem) -> Valve:
@@ -169,29 +162,34 @@ def ahead_on_ramps(fitter: Fitter, group: Group, valve: Valve, problem: Problem)
     """
     if group.signal != 'p2' or fitter.phase is LATE or 'p1' in problem[2]:
         return valve
-    return with_nuisance(fitter, valve, LEAD, problem)
+    return with_nuisance(fitter, [valve], LEAD, SHARES, problem)
 
 
-def with_nuisance(fitter: Fitter, valve: Valve, nuisance: Unknown, problem: Problem) -> Valve:
-    """Return a valve with one more unknown of the commands if that is clearly better.
+def with_nuisance(
+    fitter: Fitter,
+    valves: Sequence[Valve],
+    nuisance: Unknown,
+    tried: Sequence[float],
+    problem: Problem,
+    enough: Callable[[Leftover], bool] = lambda after: True,
+) -> Valve:
+    """Return the first valve, or one with one more unknown that is no effect if clearly better.
 
-    All searches vary it from then on.
+    `tried` are its values from which the search starts, from any of the valves; what that leaves
+    must be `enough`. All searches vary it from then on.
     """
+    valve, *_ = valves
     if nuisance in fitter.nuisances:
         return valve
     problem = ((*problem[0], nuisance), *problem[1:])
-    starts = [{**valve.values, nuisance.name: share} for share in SHARES]
-    found = [fitter.fit(each, problem) for each in fitter.scan(valve, starts, problem, 2)]
+    each = [[{**one.values, nuisance.name: value} for one in valves] for value in tried]
+    found = [fitter.fit(fitter.scan(valve, some, problem)[0], problem) for some in each]
     better = min(found, key=by_cost)
-    if not _better(valve, better, leftover(fitter.residuals(better, *problem[1:]))):
+    left = leftover(fitter.residuals(better, *problem[1:]))
+    if 0.5 * (valve.cost - better.cost) / left.worth < odds.TWIN_GAIN or not enough(left):
         return valve
     fitter.nuisances |= {nuisance}
     return better
-
-
-def _better(valve: Valve, other: Valve, left: Leftover) -> bool:
-    """Tell whether another valve, which leaves so much, is clearly better."""
-    return 0.5 * (valve.cost - other.cost) / left.worth >= odds.TWIN_GAIN
 
 
 def _along_the_valley(fitter: Fitter, valve: Valve, problem: Problem) -> list[Valve]:
