@@ -100,7 +100,7 @@ def screened(
     # what tells on every slip
     some = starts if effect.rugged or effect.imitated else starts[len(own) - len(suited) :]
     odd = odds.imitates(valve, candidate.effect)
-    if some and (odd or (not led and (first or (effect.rugged and effect.imitated)))):
+    if some and (odd or (not led and (first or effect.rugged))):
         each = [one for each in some for one in each]
         found += slip_by_slip(fitter, there, each, problem, held)
     elif way != problem:
