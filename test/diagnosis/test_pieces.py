@@ -123,6 +123,11 @@ def test_a_further_effect_must_close_part_of_the_whole_gap():
     assert odds.needed(base, small, 0.9, noise, names)
     assert not odds.needed(base, small, 0.9, noise, ['ip_nonlinearity', 'ip_calibration'])
     assert odds.needed(base, far, 0.9, noise, ['ip_nonlinearity', 'ip_calibration'])
+    # a share of a huge gap is far more than noise all the same
+    huge, twins = Leftover(701.0, 701.0, 1.0, 5000, 1.0), ['fluid_force', 'spring_nonlinearity']
+    assert odds.needed(huge, far, 0.99, noise, twins)
+    assert not odds.needed(huge, far, 0.9, near, twins)
+    assert not odds.needed(huge, near, 0.9, noise, twins)
 
 
 def test_the_place_of_a_misfit_is_found():

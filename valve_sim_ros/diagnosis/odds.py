@@ -206,14 +206,16 @@ def needed(
 ) -> bool:
     """Tell whether a further effect closes enough of the gap, `after` being both together.
 
-    One that looks like another of the `names` may only make up for a law that is not quite right.
+    One that looks like another of the `names` may only make up for a law that is not quite right,
+    unless nothing but noise is left of far more than that.
     """
     share = base.closed_by(after) - base.closed_by(before)
     left = base.closed_by(before) < MOSTLY or before.excess > FAR_OFF
     explained = left and base.closed_by(after) >= MOSTLY
     *others, last = names
     if any(look_alike(last, other) for other in others):
-        return share >= ALIKE_SHARE and (closed >= MORE_CLOSED or explained)
+        spotless = before.excess > FAR_OFF and after.excess <= SPOTLESS
+        return (share >= ALIKE_SHARE or spotless) and (closed >= MORE_CLOSED or explained)
     matters = share >= MORE_SHARE or after.excess <= SPOTLESS
     return matters and (closed >= MORE_CLOSED or explained)
 
