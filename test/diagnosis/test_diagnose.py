@@ -16,8 +16,13 @@ from valve_sim_ros import (
     read_parameters,
     Recording,
     simulate,
+    ValveSpec,
 )
 from valve_sim_ros.cli import main
+from valve_sim_ros.diagnosis.base_valve import starting_valve
+from valve_sim_ros.diagnosis.bench import Bench
+from valve_sim_ros.diagnosis.diagnose import _known
+from valve_sim_ros.diagnosis.unknowns import complete
 from valve_sim_ros.identification.watch import Stop
 from valve_sim_ros.report.diagnosis import report
 
@@ -65,6 +70,15 @@ def test_a_chamber_that_may_fill_and_empty_only_so_fast_is_named():
     rates = {name: each['value'] for name, each in named['parameters'].items()}
     assert rates['filling_rate'] == pytest.approx(6.0, rel=0.05)
     assert rates['emptying_rate'] == pytest.approx(3.0, rel=0.05)
+
+
+def test_the_speed_of_stopping_in_a_parameter_file_counts():
+    bench, spec = Bench([recording()]), ValveSpec().changed({'delta': 0.0984})
+    printed, known = (_known(starting_valve(bench), each) for each in (None, spec))
+    assert (printed.values['delta'], known.values['delta']) == (1e-5, 0.0984)
+    same = complete({**known.values, 'delta': 1e-5})
+    (early,), (late,) = bench.run(complete(known.values)), bench.run(same)
+    assert np.abs(early[2] - late[2]).max() > 0.1
 
 
 @pytest.mark.slow

@@ -105,12 +105,8 @@ def find_base(
     best = fitter.fit(found[0], problem)
     left = leftover(fitter.residuals(best, group.signal, drive))
     smeared = len(group.stages) > 1 and left.mean_square > odds.COLOURED  # no window is quiet
-
-    def worth(left: Leftover) -> bool:
-        suspicious = odds.suspicious(left, group, fitter.bench.mixed)
-        return suspicious and not odds.carried_on(left, carried)
-
-    if not (closely or smeared or worth(left)):
+    worth = odds.suspicious(left, group, fitter.bench.mixed) and not odds.carried_on(left, carried)
+    if not (closely or smeared or worth):
         return best
     stopping = standing_still(fitter, best, problem, found)
     if stopping is not best:

@@ -13,6 +13,7 @@ from ..model.composition import compose
 from ..model.effects.sensor_calibration import EFFECT as CALIBRATION
 from ..model.effects.sensor_calibration import place
 from ..model.kernels import scored
+from ..model.parameters import BASE
 from ..model.pipeline import Array
 from ..model.scoring import BESIDE
 from ..recordings.recording import OUTPUTS, Recording
@@ -339,7 +340,7 @@ class Bench:
         return float(u.min()), float(u.max())
 
 
-THETA = ('f_d1', 'T_g1', 'T_g2', 'f_s', 'f_d', 'a_1', 'a_2', 'delta')
+THETA = tuple(parameter.name for parameter in BASE)
 
 STUCK, IMMENSE = [THETA.index('f_s'), THETA.index('f_d')], 1e9
 """Friction of a stem that moves only where it is put [% of span]."""

@@ -264,7 +264,7 @@ def climb(
 
 
 def _on_time(fitter: Fitter, group: Group, rung: Rung) -> Rung:
-    """Return a step with commands where its valve shows that they came."""
+    """Return a step with commands, and the speed of stopping, as its valve shows them."""
     valve = ahead_on_ramps(fitter, group, rung.valve, fitter.problem(group, rung.valve))
     valve = standing_still(fitter, valve, fitter.problem(group, valve))
     valve = put_in_its_period(fitter, group, valve, fitter.problem(group, valve))
