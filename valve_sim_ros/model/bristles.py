@@ -18,7 +18,7 @@ SLOW, FAST = 1e-3, 6.0
 LEAST, SHARE = 1e-2, 0.03
 """The least that is left of friction [% of span, f_s]: where bristles carry nothing the law itself
 runs away."""
-TOLERANCE = 1e-4
+TOLERANCE = 3e-4
 """Error of a step [% of span]: of x, of the bristles, of the speed over the fastest rate."""
 FIRST, SHORTEST = 0.1, 2e-5
 """First step times the fastest rate, and shortest step [s]."""

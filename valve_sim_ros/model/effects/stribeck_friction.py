@@ -11,7 +11,7 @@ from ..declarations import Effect, EffectParameter
 from ..state import Motion, moved
 from ..stem import break_away, Friction, Stem, visible
 
-TOLERANCE, SLOW = 5e-4, 0.2
+TOLERANCE, SLOW = 5e-3, 0.2
 """Error of the speed in a step, as a part of the speed, or of so much of v_s if that is more."""
 FIRST, SHORTEST, STABLE = 0.05, 2e-4, 2.4
 """First step of a slip times the fastest rate of the stem, shortest [s], and longest, likewise."""
