@@ -99,7 +99,7 @@ def sample_times(recorder: Recorder, count: int, rng: Rng) -> np.ndarray:
 
 
 def coloured(rng: Rng, count: int, colour: float) -> np.ndarray:
-    """Return noise of unit variance, most of it AR(1) and the rest white if there is any colour."""
+    """Return noise of unit variance, if there is any colour most of it AR(1), the rest white."""
     white = rng.standard_normal(count)
     if colour == 0.0:
         return white
