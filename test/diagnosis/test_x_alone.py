@@ -42,7 +42,7 @@ def candidates(*effects):
 def test_base_valves_are_found_at_the_end_of_a_narrow_valley():
     """A stem that creeps imitates one that slips: lags and friction change together in between.
 
-    So narrow is it that the noise decides whether a search hits it: 11 of draws 3 to 18 were.
+    The noise decides whether a search begins in it: 12 of draws 3 to 18 do, and come to its end.
     """
     rng = np.random.default_rng(3)
     ends = np.concatenate([[40.0], rng.uniform(10.0, 90.0, 12)])
@@ -58,7 +58,7 @@ def test_base_valves_are_found_at_the_end_of_a_narrow_valley():
         # 2.0 for each sample where the stem creeps
         return best.cost < u.size and near == pytest.approx([5.0, 4.57], rel=0.1)
 
-    assert sum(found(seed) for seed in range(3, 11)) >= 4
+    assert sum(found(seed) for seed in range(3, 7)) >= 2
 
 
 def test_a_rate_that_is_limited_one_way_is_found():

@@ -9,9 +9,23 @@ from . import odds
 from .adequacy import Leftover, leftover
 from .arrivals import put_in_its_period
 from .bench import Bench, MIXED_JITTER
-from .fitting import by_cost, eased, FAINT, FINE, Fitter, NARROW, PATIENT, Problem, SHORT, Valve
+from .fitting import (
+    by_cost,
+    CROWD,
+    eased,
+    ENDS,
+    FAINT,
+    FINE,
+    Fitter,
+    MOST_TURNS,
+    NARROW,
+    PATIENT,
+    Problem,
+    SHORT,
+    Valve,
+)
 from .seen import friction_seen, mixed_arrivals
-from .single_slips import slip_by_slip
+from .single_slips import FINEST, slip_by_slip
 from .stages import Group
 from .starts import friction_grid, grid, nearby, START, STEMS, SWEEP
 from .stretch import PUT_TO_REST
@@ -126,7 +140,24 @@ def find_base(
     found += [fitter.fit(each, problem) for each in rested]
     found = sorted(found, key=by_cost)[:FOLLOWED]
     found += [fitter.evolve(each, problem, GENERATIONS, NARROW) for each in found]
-    return standing_still(fitter, fitter.refined(min(found, key=by_cost), problem), problem)
+    best = fitter.refined(min(found, key=by_cost), problem)
+    if len(group.stages) > 1:
+        best = _to_the_end(fitter, best, problem)
+    return standing_still(fitter, best, problem)
+
+
+def _to_the_end(fitter: Fitter, valve: Valve, problem: Problem) -> Valve:
+    """Return the valve at the end of the valley in which this one stands, narrow and bent."""
+    for _ in range(MOST_TURNS):
+        before = valve.cost
+        for way in eased(problem):
+            there = fitter.fit(fitter.evolve(valve, way, 2 * PATIENT, FINEST, CROWD), problem)
+            if way != problem:
+                there = fitter.fit(fitter.evolve(there, problem, GENERATIONS, FINE), problem)
+            valve = min(valve, there, key=by_cost)
+        if valve.cost > ENDS * before:
+            break
+    return valve
 
 
 def standing_still(

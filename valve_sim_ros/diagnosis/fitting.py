@@ -38,7 +38,8 @@ SPREAD, NARROW, FINE = 5.0, 3.0, 1.0
 hangs on every step [steps of unknowns]."""
 REFINING = NARROW, FINE, 0.3, 0.1
 """The same for evolutions in turn that refine a valve: slips leave valleys of any width."""
-POPULATION = 14
+POPULATION, CROWD = 14, 28
+"""Points of a generation, and of one that follows a narrow and bent valley."""
 FAINT, NEAR = 0.02, 2.0
 """Excess up to which a train of slips is right (laborious effects leave more in a base valve), and
 up to which a valve is refined again and again, with fine steps as well."""
@@ -173,6 +174,7 @@ class Fitter:
         problem: Problem,
         generations: int,
         spread: float = SPREAD,
+        size: int = POPULATION,
     ) -> Valve:
         """Return the best valve that evolution finds around this one."""
         self.alive()
@@ -188,7 +190,7 @@ class Fitter:
             spread,
             np.random.default_rng(self.seed),
             generations,
-            POPULATION,
+            size,
         )
         return replace(
             valve, values=to_values(unknowns, found.point, valve.values), cost=found.cost

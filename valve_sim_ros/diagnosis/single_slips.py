@@ -11,8 +11,21 @@ import math
 from ..model.effects import CATALOGUE
 from . import odds
 from .adequacy import Leftover, leftover
-from .fitting import by_cost, eased, FAINT, FINE, Fitter, GENERATIONS, Problem, SHORT, Valve
-from .starts import nearby, STEMS
+from .fitting import (
+    by_cost,
+    CROWD,
+    eased,
+    FAINT,
+    FINE,
+    Fitter,
+    GENERATIONS,
+    PATIENT,
+    POPULATION,
+    Problem,
+    SHORT,
+    Valve,
+)
+from .starts import nearby, sliding, STEMS
 from .stretch import CAUGHT, PUT_TO_REST, RESTS, SOON
 
 BEGUN, DESCENT, FOLLOWED, TURNS, FINEST = 8, 12, 3, 25, 0.3
@@ -22,11 +35,8 @@ unknowns]."""
 FINENESS, SCATTERS = 11, 4
 """Binary logarithm of how many are scattered around the best of them, caught, if none of these
 explains all; and how many of those are taken on."""
-RATES, SHARES, DAMPINGS = (4.0, 9.0, 20.0, 60.0), (0.4, 0.7), (0.7, 2.0)
-"""Stems [1/s], their kinetic friction and their damping, from which a law that falls with speed is
-sought: between them the valley is long, narrow and bent."""
-LEVELS = 0.97, 1.0, 1.03
-"""Shares of what holds the stem from which it is sought."""
+FINELY = 13
+"""The same for a law that falls with speed: its valley is long, narrow and bent."""
 WORTH_LEADING = 0.95
 """Part of the cost of the base valve, caught as soon, beyond which such a law is not led on."""
 FAR_OFF = 1.0
@@ -70,10 +80,12 @@ def slip_by_slip(
         """Lead a valve on to all slips; return what it leaves where that ended."""
         for way in ways:
             # single slips hardly tell the law: it is found where their moments hardly count
-            first = not {SOON, CAUGHT}.isdisjoint(way[2])
-            turns = GENERATIONS if first else TURNS
-            spread = FINE if first and not by_stem else FINEST
-            more = fitter.evolve(there, way, turns, spread)
+            turns, spread, size = TURNS, FINEST, POPULATION
+            if SOON in way[2]:
+                turns, spread, size = PATIENT, FINE, CROWD
+            elif CAUGHT in way[2]:
+                turns, spread = GENERATIONS, FINEST if by_stem else FINE
+            more = fitter.evolve(there, way, turns, spread, size)
             there = fitter.fit(more, way, DESCENT)
             left = leftover(fitter.residuals(there, signal, way[2]))
             if left.excess > FAR_OFF and plain(way[2]).closed_by(left) < odds.MOSTLY:
@@ -131,20 +143,11 @@ def _stem_by_stem(
     A friction that falls with speed shows in trains of slips rather than in single ones, and a
     stem that creeps seems to rest: it is caught as soon as it is half a slip off.
     """
-    unknowns = soon[0]
-    added = [unknown.name for unknown in valve.candidates[-1].unknowns]
-    laws = {tuple(start[name] for name in added): start for start in starts}.values()
+    names = [unknown.name for unknown in valve.candidates[-1].unknowns]
     level = held if held > 0.0 else valve.values['f_s']
-    along = tuple(unknown for unknown in unknowns if unknown.name != 'a_1/a_2'), *soon[1:]
-    each = []
-    for rate, share in product(RATES, SHARES):
-        some = [
-            {**law, 'f_s': part * level, 'f_d/f_s': share, 'a_1/a_2': rate, 'damping': damping}
-            for law, part, damping in product(laws, LEVELS, DAMPINGS)
-        ]
-        there = fitter.fit(fitter.scan(valve, some, soon)[0], along, SHORT)
-        each.append(fitter.fit(fitter.evolve(there, soon, GENERATIONS, FINE), soon, DESCENT))
-    return sorted(each, key=by_cost)
+    near = fitter.scan(valve, sliding(starts, names, level, FINELY), soon, BEGUN)
+    each = [fitter.evolve(one, soon, GENERATIONS, FINE) for one in near]
+    return sorted((fitter.fit(one, soon, DESCENT) for one in each), key=by_cost)
 
 
 def _worth_leading(fitter: Fitter, valve: Valve, soon: Problem) -> bool:

@@ -63,6 +63,14 @@ ANY_STEM: dict[str, tuple[float, float]] = {
 ANY_SIZE = 0.3, 3.0
 """Where a valve that slips lies from one that creeps and fits best: times its values, its stem,
 and times the parameters of its effects. The valley between them is long, narrow and bent."""
+SLIDING: dict[str, tuple[float, float]] = {
+    'f_d/f_s': (0.35, 0.95),
+    'a_1/a_2': (3.0, 80.0),
+    'damping': (0.4, 4.0),
+}
+HELD = 0.95, 1.03
+"""Where a valve lies whose friction falls with speed: its stem, and what holds it times what the
+data show."""
 AROUND = (0.9, 1.0)
 """Shares of the friction that the data show from which a search starts."""
 
@@ -88,6 +96,28 @@ def nearby(
         elif (name in NEARBY or '.' in name) and values[name] > 0.0:
             low, high = NEARBY.get(name, ANY_SIZE)
             spans[name] = low * values[name], high * values[name]
+    return _scattered(values, spans, fineness)
+
+
+def sliding(
+    starts: Sequence[Mapping[str, float]], names: Sequence[str], level: float, fineness: int
+) -> list[dict[str, float]]:
+    """Return 2 to the `fineness` starts of a friction that falls with speed, scattered evenly.
+
+    `names` are the parameters of its law, `level` is what seems to hold the stem [% of span].
+    """
+    spans = {'f_s': (HELD[0] * level, HELD[1] * level), **SLIDING}
+    for name in names:
+        each = [start[name] for start in starts]
+        low, high = (1.0, 1.0) if min(each) < max(each) else ANY_SIZE
+        spans[name] = low * min(each), high * max(each)
+    return _scattered(starts[0], spans, fineness)
+
+
+def _scattered(
+    values: Mapping[str, float], spans: Mapping[str, tuple[float, float]], fineness: int
+) -> list[dict[str, float]]:
+    """Return 2 to the `fineness` values, scattered evenly over the logarithms of these spans."""
     low, high = np.log(list(spans.values())).T
     points = qmc.Sobol(len(spans), scramble=False).random_base2(fineness)
     each = np.exp(low + points * (high - low)).tolist()
