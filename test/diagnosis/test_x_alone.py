@@ -55,8 +55,8 @@ def test_base_valves_are_found_at_the_end_of_a_narrow_valley():
         fitter = Fitter(Bench([Recording(s.t, u, x=s.x + noise)]))
         best = find_base(fitter, ALL, starting_valve(fitter.bench), ())
         near = [best.values[name] for name in ('T_g1', 'f_s')]
-        # 2.0 for each sample where the stem creeps
-        return best.cost < u.size and near == pytest.approx([5.0, 4.57], rel=0.1)
+        # 2.0 for each sample where the stem creeps, 0.5 or more on the way to the end
+        return best.cost < 0.5 * u.size and near == pytest.approx([5.0, 4.57], rel=0.1)
 
     assert sum(found(seed) for seed in range(3, 7)) >= 2
 
