@@ -41,6 +41,16 @@ def test_noise_of_any_colour_leaves_no_excess(colour):
     assert left.noise == (colour > 0.0)
 
 
+@pytest.mark.parametrize('seed', range(4))
+@pytest.mark.parametrize('share', [0.2, 0.5, 0.8])
+@pytest.mark.parametrize('colour', [0.75, 0.86, 0.92])
+def test_white_noise_beside_coloured_noise_leaves_no_excess(colour, share, seed):
+    rng = np.random.default_rng(seed)
+    lasting = lfilter([np.sqrt(1 - colour**2)], [1, -colour], rng.standard_normal(4500))
+    noise = np.sqrt(1 - share) * lasting + np.sqrt(share) * rng.standard_normal(4500)
+    assert leftover(seen(noise)).excess < 0.25
+
+
 @pytest.mark.parametrize('share', [0.3, 0.6, 0.9, 0.97])
 @pytest.mark.parametrize('kind', ['wander', 'decays', 'swing'])
 def test_misfit_in_white_noise_is_no_coloured_noise(kind, share):

@@ -8,6 +8,7 @@ import numpy as np
 from scipy.stats import chi2
 
 from ..model.pipeline import Array
+from .coloured_noise import colour_of
 
 WINDOW = 20
 """Samples of the windows in which noise is told from misfit."""
@@ -22,17 +23,12 @@ ONE_SLIP = 0.01
 it should be."""
 LOWEST, HIGHEST = 0.3, 8.0
 """What may be noise [that seen from sample to sample]: a swinging model leaves no quiet window."""
-COLOURS, CLIPPED = (0.4, 0.92), 4.0
-"""Correlation from sample to sample of what may be coloured noise; innovations further out than
-this are slips [standard deviations]."""
-LAGS, WHITE, SURELY = 4, 0.04, 2.5
-"""Innovations of noise are white: correlations over so many samples are no larger than this, or so
-many times their own error."""
-LONG_WINDOWS = {10: 0.2, 20: 0.3}
-"""So much more than those of white noise may means of windows of so many samples vary."""
-MISSED, LASTS, FASTER = 0.1, 0.7, 5.0
-"""Excess that windows see in noise of such colours, at most, and how much more per correlation
-beyond LASTS: such noise lasts as long as they do."""
+AS_QUIET = 0.85
+"""Coloured noise shows at least this part of the noise that windows see of such noise: misfit has
+windows that are quieter."""
+TAILS, EXAMPLE = 1.1, 20_000
+"""Mean square that coloured noise has at most [its variance]: slips are none; and how many samples
+of it show what windows see."""
 
 
 class Leftover(NamedTuple):
@@ -75,26 +71,19 @@ def leftover(residual: Array) -> Leftover:
     if values.size < 4 * WINDOW:
         total = float(np.mean(values**2)) if values.size else 0.0
         return Leftover(total, total, 1.0, values.size, 1.0)
-    windows = values[: values.size // WINDOW * WINDOW].reshape(-1, WINDOW)
-    centred = windows - windows.mean(axis=1, keepdims=True)
-    variances = centred.var(axis=1, ddof=1)
-    expected = chi2.ppf(QUIET, WINDOW - 1) / (WINDOW - 1)
-    floor = float(np.quantile(variances, QUIET)) / expected
-    quiet = windows[variances <= np.quantile(variances, 0.6)]
-    inflation = _inflation(quiet)
+    quiet, inflation = _quiet(values)
+    floor = min(max(quiet, LOWEST), HIGHEST)
     sizes = np.abs(values)
     cut = np.minimum(sizes, LARGE)
-    floor = min(max(floor * inflation**0.5, LOWEST), HIGHEST)
     square = float(np.mean(cut**2))
-    noise = _coloured_noise(residual) if inflation > 1.0 else None
+    colour = colour_of(residual) if inflation > 1.0 else None
     coloured = False
-    if noise:
-        variance, correlation = noise
-        missed = MISSED + FASTER * max(correlation - LASTS, 0.0)
-        coloured = square <= (1.0 + missed) * floor
-    if coloured:
-        floor = max(floor, variance)
-        inflation = max(inflation, (1.0 + correlation) / (1.0 - correlation))
+    if colour and square <= TAILS * colour.variance:
+        alike, _ = _quiet(colour.example(EXAMPLE))
+        coloured = quiet >= AS_QUIET * alike
+    if colour and coloured:
+        floor = max(floor, colour.variance)
+        inflation = max(inflation, colour.inflation)
     return Leftover(
         float(np.mean(cut * (2.0 * sizes - cut))),
         square,
@@ -118,32 +107,13 @@ def but_one_slip(residual: Array) -> Array:
     return rest
 
 
-def _coloured_noise(residual: Array) -> tuple[float, float] | None:
-    """Return variance and correlation of AR(1) noise if a residual is nothing else, else None.
-
-    Windows see too little of noise that lasts as long as they do. What is left of it once each
-    value is foretold from the one before is white, unlike what misfit in white noise leaves then.
-    """
-    values = np.where(residual != 0.0, residual, np.nan)
-    limit = CLIPPED * float(np.nanmedian(np.abs(values))) / 0.6745
-    values = np.clip(values, -limit, limit)
-    pairs = np.isfinite(values[:-1] * values[1:])
-    first, second = values[:-1][pairs], values[1:][pairs]
-    correlation = float(first @ second) / max(float(first @ first), 1e-12)
-    if not COLOURS[0] <= correlation <= COLOURS[1]:
-        return None
-    innovations = values[1:] - correlation * values[:-1]
-    known = innovations[pairs]
-    variance = float(np.mean(known**2))
-    tolerance = max(WHITE, SURELY / known.size**0.5)
-    for lag in range(1, LAGS + 1):
-        if abs(float(np.nanmean(innovations[lag:] * innovations[:-lag]))) > tolerance * variance:
-            return None
-    for width, more in LONG_WINDOWS.items():
-        means = known[: known.size // width * width].reshape(-1, width).mean(axis=1)
-        if float(np.mean(means**2)) * width > (1.0 + more) * variance:
-            return None
-    return variance / (1.0 - correlation**2), correlation
+def _quiet(values: Array) -> tuple[float, float]:
+    """Return the noise that windows of an error show, and what `_inflation` tells of it."""
+    windows = values[: values.size // WINDOW * WINDOW].reshape(-1, WINDOW)
+    variances = windows.var(axis=1, ddof=1)
+    expected = chi2.ppf(QUIET, WINDOW - 1) / (WINDOW - 1)
+    inflation = _inflation(windows[variances <= np.quantile(variances, 0.6)])
+    return float(np.quantile(variances, QUIET)) / expected * inflation**0.5, inflation
 
 
 def _inflation(windows: Array) -> float:
