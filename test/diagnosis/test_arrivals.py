@@ -32,6 +32,7 @@ def recorded(rng, share, **effects):
     return Recording(run.t, u, *noisy), steps, early
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ('share', 'effect'),
     [
@@ -116,6 +117,7 @@ def test_steps_that_come_at_any_time_are_put_where_they_came(offset):
     assert [values[n] for n in ('T_g1', 'T_g2')] == pytest.approx([1.0, 2.0], rel=0.03)
 
 
+@pytest.mark.slow
 def test_some_steps_may_come_between_those_on_either_side_of_a_sample():
     rng = np.random.default_rng(2)
     since = rng.choice([0, 1, 6], 50, p=[0.2, 0.6, 0.2])
@@ -126,6 +128,7 @@ def test_some_steps_may_come_between_those_on_either_side_of_a_sample():
     assert max(ladder.before.mean_square for ladder in found.ladders) < 1.0  # noise
 
 
+@pytest.mark.slow
 def test_an_effect_of_the_chamber_is_no_scatter_of_commands():
     u = steps_at_any_time(np.random.default_rng(2))
     run = simulate(

@@ -58,6 +58,7 @@ def test_p1_read_just_before_the_command_is_no_lag(command):
     assert named(read_just_before(rows, 0.2, 0.06, rng)) == []
 
 
+@pytest.mark.slow
 def test_misfit_all_over_p2_does_not_pass_for_coloured_noise():
     rng = np.random.default_rng(6)
     effects = {'nonlinear_flow.exponent': 0.74}
@@ -83,6 +84,7 @@ def test_coloured_noise_of_p2_is_no_effect(colour, expected):
     assert named(Recording(run.t, run.u, *noisy)) == expected
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('offset', [0.0, 0.5])
 def test_steps_of_a_sensor_show_under_noise_that_comes_after_them(offset):
     rng = np.random.default_rng(8)
@@ -108,6 +110,7 @@ def test_a_name_that_closes_little_on_both_parts_is_withdrawn(fitted, held_out, 
     assert not _closes_nothing({'x': gap}, replace(ladder, rungs=(coarse,)))
 
 
+@pytest.mark.slow
 def test_a_lag_of_the_sensor_is_not_taken_for_a_stem_slower_than_any():
     rng = np.random.default_rng(9)
     valve = {'f_d1': 0.5, 'T_g1': 2.9, 'T_g2': 4.2, 'f_s': 3.4, 'f_d': 2.7}

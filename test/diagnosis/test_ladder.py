@@ -112,6 +112,7 @@ def test_many_far_errors_are_chance_in_slips_only(far):
     assert (concluded(of_p1).outcome == 'unknown_effect') == (far >= 10)
 
 
+@pytest.mark.slow
 def test_a_dead_time_that_is_no_candidate_is_unknown_where_p1_shows_it():
     """It is off at one sample per step only, where jitter forgives most."""
     record = measured(hold=170, **{'ip_dead_time.dead_time': 0.35})
@@ -188,6 +189,7 @@ def test_x_alone_must_leave_more_before_a_name_is_sought():
     assert suspicious(left(0.2), alone, False)
 
 
+@pytest.mark.slow
 def test_what_a_led_stem_hides_is_judged_with_a_free_one():
     vibration = {'vibration.amplitude': 1.5, 'vibration.frequency': 0.2, 'vibration.phase': 0.3}
     fitter, base = fitted(measured(**vibration))
@@ -272,6 +274,7 @@ def test_a_first_effect_that_the_second_makes_needless_is_dropped():
     assert rungs[0].after.excess < 0.05
 
 
+@pytest.mark.slow
 def test_a_first_effect_keeps_its_name_though_its_search_anew_ends_worse(monkeypatch):
     effects = {'spring_preload.pressure': 8.0, 'sensor_drift.rate': 40.0}
     fitter, base = fitted(measured(**effects))
@@ -302,6 +305,7 @@ def test_a_first_effect_keeps_its_name_though_its_search_anew_ends_worse(monkeyp
     assert found[-1].valve.cost == both.cost
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('seed', [0, 1])
 def test_a_bump_is_found_beside_another_effect_though_next_to_none_costs_least_at_first(seed):
     rng = np.random.default_rng(seed)
@@ -454,6 +458,7 @@ def test_where_there_is_no_gap_what_a_base_valve_imitates_is_tried(monkeypatch):
     assert tried == ['spring_rate', 'linkage_backlash']
 
 
+@pytest.mark.slow
 def test_an_effect_found_in_p1_is_not_fitted_anew_to_p2():
     """A leak looks like a converter's span to p2, which must not undo what p1 shows."""
     both = {'ip_calibration.span': 0.97, 'air_leak.leak_rate': 0.36}
@@ -483,6 +488,7 @@ def test_steps_of_x_are_named_where_no_fit_shows_them(outcome):
     assert rounded(fitter, found, only, again) == found
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('lag', [0.4, 0.0])
 def test_a_lag_that_a_slower_stem_hides_in_coloured_noise_is_named(lag):
     rng = np.random.default_rng(4)
@@ -496,6 +502,7 @@ def test_a_lag_that_a_slower_stem_hides_in_coloured_noise_is_named(lag):
     assert named == ({'sensor_lag.time_constant': pytest.approx(lag, rel=0.1)} if lag else {})
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('noise', [0.0, 0.05])
 def test_a_clean_record_in_steps_of_a_tenth_is_adequate(noise):
     rng = np.random.default_rng(7)

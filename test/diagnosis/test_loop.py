@@ -55,6 +55,7 @@ def excess(fitter, valve, signal):
     return leftover(fitter.residuals(valve, signal)).excess
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('gain', [0.5, 2.0])
 def test_slips_within_a_sample_are_told_by_the_whole_loop(gain):
     fitter, parts, valve = behind_a_positioner(gain)
@@ -70,6 +71,7 @@ def test_slips_within_a_sample_are_told_by_the_whole_loop(gain):
     assert found.values['T_g2'] == pytest.approx(VALVE['T_g2'], abs=0.03)
 
 
+@pytest.mark.slow
 def test_the_loop_explains_no_effect_of_the_stem():
     fitter, parts, valve = behind_a_positioner(2.0, **{'friction_asymmetry.difference': 0.4})
     drive = fitter.drive

@@ -45,6 +45,7 @@ def test_lost_commands_of_one_that_creeps_lie_on_a_line_and_steps_are_unsure():
     assert unsure.tolist() == [9]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('ramp', [False, True])
 def test_a_clean_record_that_lost_commands_is_adequate(tmp_path, ramp):
     rng = np.random.default_rng(8)
@@ -79,6 +80,7 @@ def test_a_lost_command_that_was_not_on_the_line_tells_nothing_of_p1(tmp_path):
     assert (left.far, base.values['f_d1']) == (0, pytest.approx(VALVE['f_d1'], abs=0.02))
 
 
+@pytest.mark.slow
 def test_a_clean_record_that_lost_whole_rows_is_adequate(tmp_path):
     rng = np.random.default_rng(9)
     u = np.repeat(rng.uniform(10.0, 90.0, 40), 60)

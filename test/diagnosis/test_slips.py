@@ -196,6 +196,7 @@ def test_a_play_holds_the_stem_with_less_friction():
     assert slips['f_s'] * (1.0 - slips['f_d/f_s']) == pytest.approx(6.0 * (1.0 - share))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('draw', [1, 2])
 def test_a_play_larger_than_its_slips_is_found_behind_a_swinging_stem(draw):
     # of draws 1 to 4 these two are found, none was while x at rest put the stem to rest as well
