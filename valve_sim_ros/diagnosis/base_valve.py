@@ -19,6 +19,7 @@ from .fitting import (
     Fitter,
     MOST_TURNS,
     NARROW,
+    NEAR,
     PATIENT,
     Problem,
     SHORT,
@@ -141,7 +142,8 @@ def find_base(
     found = sorted(found, key=by_cost)[:FOLLOWED]
     found += [fitter.evolve(each, problem, GENERATIONS, NARROW) for each in found]
     best = fitter.refined(min(found, key=by_cost), problem)
-    if len(group.stages) > 1:
+    left = leftover(fitter.residuals(best, group.signal, drive))
+    if len(group.stages) > 1 and left.excess <= NEAR:
         best = _to_the_end(fitter, best, problem)
     return standing_still(fitter, best, problem)
 
@@ -166,8 +168,9 @@ def standing_still(
     """Return a valve whose stem stops at another speed than is printed, if that is all it lacks.
 
     Where p2 goes on slowly it stops that much sooner, and leaves by a slip. What would leave more
-    than noise might only imitate an effect; one that is put to rest does not tell. All searches
-    vary the speed from then on; it is also sought from the `others`.
+    than noise, once refined if it closes half, might only imitate an effect; one that is put to
+    rest does not tell. All searches vary the speed from then on; it is also sought from the
+    `others`.
     """
     _, signal, drive = problem
     if signal != 'x' or PUT_TO_REST & {*drive}:
@@ -176,10 +179,21 @@ def standing_still(
     if before.excess <= FAINT:
         return valve
 
-    def explains(after: Leftover) -> bool:
-        return before.closed_by(after) >= odds.LEAST_CLOSED and after.excess <= odds.SPOTLESS
+    def led(start: Valve, problem: Problem) -> Valve:
+        there = start
+        for way in eased(problem):
+            there = fitter.fit(there, way)
+        return min(there, fitter.fit(start, problem), key=by_cost)
 
-    return with_nuisance(fitter, [valve, *others], STANDSTILL, SPEEDS, problem, explains)
+    def explains(found: Valve, problem: Problem) -> Valve:
+        after = leftover(fitter.residuals(found, signal, drive))
+        if before.closed_by(after) < odds.LEAST_CLOSED:
+            return valve
+        found = fitter.refined(found, problem)
+        after = leftover(fitter.residuals(found, signal, drive))
+        return found if after.excess <= odds.SPOTLESS else valve
+
+    return with_nuisance(fitter, [valve, *others], STANDSTILL, SPEEDS, problem, led, explains)
 
 
 def ahead_on_ramps(fitter: Fitter, group: Group, valve: Valve, problem: Problem) -> Valve:
@@ -198,22 +212,25 @@ def with_nuisance(
     nuisance: Unknown,
     tried: Sequence[float],
     problem: Problem,
-    enough: Callable[[Leftover], bool] = lambda after: True,
+    fit: Callable[[Valve, Problem], Valve] | None = None,
+    ended: Callable[[Valve, Problem], Valve] = lambda found, problem: found,
 ) -> Valve:
     """Return the first valve, or one with one more unknown that is no effect if clearly better.
 
-    `tried` are its values from which the search starts, from any of the valves; what that leaves
-    must be `enough`. All searches vary it from then on.
+    `tried` are its values from which the search starts, from any of the valves, by another `fit`
+    than is usual if told; the best is `ended`, which may return the first. All searches vary the
+    unknown from then on.
     """
     valve, *_ = valves
     if nuisance in fitter.nuisances:
         return valve
     problem = ((*problem[0], nuisance), *problem[1:])
+    fit = fit or fitter.fit
     each = [[{**one.values, nuisance.name: value} for one in valves] for value in tried]
-    found = [fitter.fit(fitter.scan(valve, some, problem)[0], problem) for some in each]
-    better = min(found, key=by_cost)
+    found = [fit(fitter.scan(valve, some, problem)[0], problem) for some in each]
+    better = ended(min(found, key=by_cost), problem)
     left = leftover(fitter.residuals(better, *problem[1:]))
-    if 0.5 * (valve.cost - better.cost) / left.worth < odds.TWIN_GAIN or not enough(left):
+    if 0.5 * (valve.cost - better.cost) / left.worth < odds.TWIN_GAIN:
         return valve
     fitter.nuisances |= {nuisance}
     return better

@@ -10,7 +10,7 @@ import math
 from ..identification.watch import Progress
 from . import dead_time, odds
 from .adequacy import leftover
-from .base_valve import find_base
+from .base_valve import find_base, standing_still
 from .coarse import rounded
 from .fitting import by_cost, FINE, Fitter, GENERATIONS, NARROW, PATIENT, Valve
 from .ladder import climb, concluded, excused, Ladder, MOST_EFFECTS
@@ -133,8 +133,7 @@ def _second_look(fitter: Fitter, ladder: Ladder, again: Callable[[], Ladder]) ->
         fitter.drive = drive
         complete = complete and found.complete
         if found.outcome == 'missing_effect':
-            valve = fitter.refined(found.valve, fitter.problem(ladder.group, found.valve))
-            return replace(found, valve=valve, base=ladder.base)
+            return replace(found, valve=_free(fitter, found.group, found.valve), base=ladder.base)
         if not complete:
             break
         if named := _let_go(fitter, ladder, found.best_guess):
@@ -185,13 +184,24 @@ def _freed(
     """Return the ladder of a caught stem let go, if its names explain what a free one leaves."""
     if caught.outcome != 'missing_effect':
         return None
-    group, free = caught.group, caught.valve
+    free = caught.valve
     with fitter.ends_at(stops):
-        free = fitter.refined(free, fitter.problem(group, free))
-    after = leftover(fitter.residuals(free, group.signal))
+        free = _free(fitter, caught.group, free)
+    after = leftover(fitter.residuals(free, caught.group.signal))
     found = replace(caught, base=hasty.base, valve=free, before=hasty.before, after=after)
     found = concluded(found)
     return found if _final(found) else None
+
+
+def _free(fitter: Fitter, group: Group, valve: Valve) -> Valve:
+    """Return a valve whose stem was put to rest, refined while it is free.
+
+    Put to rest it does not show at which speed it stops.
+    """
+    problem = fitter.problem(group, valve)
+    free = fitter.refined(valve, problem)
+    there = standing_still(fitter, free, problem, [valve])
+    return free if there is free else fitter.refined(there, fitter.problem(group, there))
 
 
 def _final(ladder: Ladder) -> bool:
@@ -228,7 +238,7 @@ def _let_go(fitter: Fitter, ladder: Ladder, guess: Rung | None) -> Ladder | None
     """
     if guess is None or guess.closed < odds.LEAST_LED:
         return None
-    valve = fitter.refined(guess.valve, fitter.problem(ladder.group, guess.valve))
+    valve = _free(fitter, ladder.group, guess.valve)
     found = _named(fitter, ladder, replace(guess, valve=valve))
     return found if found.outcome == 'missing_effect' else None
 

@@ -44,8 +44,9 @@ FAR_AHEAD, BEHIND = 0.2, 0.5
 more than a part of its gain are not followed."""
 PROMISING = 0.05
 """Part of the gap that a first refit must close for any to be followed before all have begun."""
-DEEPENED = 3
-"""So many effects are searched more deeply where none explains what is left."""
+DEEPENED, OUTRUN = 3, 2.0
+"""So many effects are searched more deeply where none explains what is left, none of which costs
+more than this [cost of the best]."""
 
 LAGS = ('T_g1', 'T_g2')
 
@@ -245,7 +246,7 @@ def _run(
         if nearly_all(best):
             effect = best.candidates[-1].effect
             slow = [e for e in slow if e in hidden or odds.look_alike(effect, e.effect)]
-        elif ended and left < (odds.CLEAN if valve.candidates else FAINT):
+        elif ended and left < (odds.CLEAN if valve.candidates else odds.SPOTLESS):
             slow = [e for e in slow if e in hidden or not e.laborious]
         # a law with one more parameter is tried only where the plain one leaves something
         further = [e for e in slow if group.has_stem and e.extends(slow)]
@@ -305,7 +306,8 @@ def _deepened(
     if explains(best):
         return runners
     found = []
-    for each in in_reach(valve, odds.best_per_effect(runners)[:DEEPENED]):
+    near = [each for each in runners if each.cost <= OUTRUN * best.cost]
+    for each in in_reach(valve, odds.best_per_effect(near)[:DEEPENED]):
         # far behind one that explains the signal, others need no deeper search
         hopeless = explains(best) and each.cost > best.cost / FAR_AHEAD
         added = each.candidates[-1]
