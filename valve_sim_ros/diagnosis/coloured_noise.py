@@ -22,8 +22,8 @@ SEEN, ENOUGH = 8, 3000
 """Lags that show the colour, and samples that tell white noise beside it: in fewer misfit passes
 for it."""
 LAGS, WHITE, SURELY = 4, 0.04, 2.5
-"""Innovations of noise are white: correlations over so many samples are
-no larger than this, or so many times their own error."""
+"""Innovations of noise are white: correlations over so many samples are no larger than this, or so
+many times their own error."""
 LONG_WINDOWS = {10: 0.2, 20: 0.3}
 """So much more than those of white noise may means of windows of so many samples vary."""
 BLOCK, STEADY = 20, 1.7
