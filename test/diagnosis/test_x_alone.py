@@ -41,7 +41,7 @@ def candidates(*effects):
 
 
 def test_the_speed_at_which_a_stem_stops_shows_once_its_other_values_are_refined():
-    """A fit without it puts lags and friction far off, and then it closes but half of the gap."""
+    """A fit without it puts lags and friction far off, from where one with it does not return."""
     fitter = measured(samples=100, delta=0.0984)
     true = {**VALVE, 'f_d/f_s': VALVE['f_d'] / VALVE['f_s']}
     start = starting_valve(fitter.bench)

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.stats import chi2
 
 from ..model.pipeline import Array
-from .coloured_noise import colour_of
+from .coloured_noise import Colour, colour_of
 
 WINDOW = 20
 """Samples of the windows in which noise is told from misfit."""
@@ -77,11 +77,9 @@ def leftover(residual: Array) -> Leftover:
     cut = np.minimum(sizes, LARGE)
     square = float(np.mean(cut**2))
     colour = colour_of(residual) if inflation > 1.0 else None
-    coloured = False
-    if colour and square <= TAILS * colour.variance:
-        alike, _ = _quiet(colour.example(EXAMPLE))
-        coloured = quiet >= AS_QUIET * alike
-    if colour and coloured:
+    if colour and not _alike(colour, quiet, square):
+        colour = None
+    if colour:
         floor = max(floor, colour.variance)
         inflation = max(inflation, colour.inflation)
     return Leftover(
@@ -91,7 +89,7 @@ def leftover(residual: Array) -> Leftover:
         values.size,
         inflation,
         int(np.sum(sizes > FAR * floor**0.5)),
-        coloured,
+        colour is not None,
     )
 
 
@@ -105,6 +103,13 @@ def but_one_slip(residual: Array) -> Array:
     rest = residual.copy()
     rest[max(far[worst] - 1, 0) : ends[worst]] = np.nan
     return rest
+
+
+def _alike(colour: Colour, quiet: float, square: float) -> bool:
+    """Tell whether what quiet windows and the mean square show is as of noise of a colour."""
+    if square > TAILS * colour.variance:
+        return False
+    return quiet >= AS_QUIET * _quiet(colour.example(EXAMPLE))[0]
 
 
 def _quiet(values: Array) -> tuple[float, float]:
