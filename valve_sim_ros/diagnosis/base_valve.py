@@ -132,6 +132,8 @@ def find_base(
         found += slip_by_slip(fitter, valve, starts, problem)
         best = min(found, key=by_cost)
         left = leftover(fitter.residuals(best, group.signal, drive))
+        if odds.no_base(left, group):
+            return best
         if not (closely or odds.suspicious(left, group, fitter.bench.mixed)):
             return fitter.refined(best, problem)
     eases = found if way == problem else followed(way)

@@ -31,6 +31,9 @@ MORE_FAR = 10
 """So many errors beyond any noise are as good a reason to look for it as an excess."""
 SPOTLESS = 0.1
 """Excess that is nothing but noise."""
+NO_BASE = 10.0
+"""Excess of x, driven by p2, beyond which no longer search leads to a base valve that explains it:
+100 clean records leave at most 4.5 before."""
 NEGLIGIBLE = 1.0 / 3.0
 """An effect of less than this part of its least usual size is another run of the base valve."""
 LOOP, BLURRED = 'positioner_loop', 0.7
@@ -98,6 +101,11 @@ def suspicious(left: Leftover, group: Group, mixed: bool) -> bool:
         alone = 'u-p1' in group.stages
         return left.excess >= (LEAST_IF_ALONE if alone else least) or left.far >= LEAST_FAR
     return left.excess >= least or coloured(group, left)
+
+
+def no_base(left: Leftover, group: Group) -> bool:
+    """Tell whether what a base valve leaves of x is more than a longer search for one mends."""
+    return group.stages == ('p2-x',) and left.excess > NO_BASE
 
 
 def coloured(group: Group, left: Leftover) -> bool:

@@ -219,9 +219,15 @@ def _run(
         def nearly_all(best: Valve) -> bool:
             return odds.nearly_all(before, whole(best))
 
+        if not group.has_stem and left < FAINT:  # behind nothing a law needs no more parameters
+            candidates = [each for each in candidates if not each.extends(candidates)]
+        # what drifts is led by single slips: that waits until the others have ended, too
+        drifts = [each for each in candidates if group.has_stem and each.effect in (DRIFT, WANDER)]
         quick, imitated, slow = (
-            [each for each in candidates if each.tier == tier] for tier in range(3)
+            [each for each in candidates if each.tier == tier and each not in drifts]
+            for tier in range(3)
         )
+        imitated += drifts
         if raced:
             runners, waiting = ([*raced], []) if promising(raced) else ([], [*raced])
         else:
@@ -329,7 +335,10 @@ def rebased(fitter: Fitter, group: Group, valve: Valve, runners: Sequence[Valve]
         for r in runners
     ]
     best = min((fitter.fit(each, problem) for each in there), key=by_cost)
-    return min(valve, fitter.refined(best, problem) if group.has_stem else best, key=by_cost)
+    left = leftover(fitter.residuals(best, group.signal))
+    if group.has_stem and not odds.no_base(left, group):
+        best = fitter.refined(best, problem)
+    return min(valve, best, key=by_cost)
 
 
 def _swings(fitter: Fitter, residual: Array) -> tuple[float, ...]:
