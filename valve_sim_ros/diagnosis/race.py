@@ -221,29 +221,29 @@ def _run(
 
         if not group.has_stem and left < FAINT:  # behind nothing a law needs no more parameters
             candidates = [each for each in candidates if not each.extends(candidates)]
-        # what drifts is led by single slips: that waits until the others have ended, too
-        drifts = [each for each in candidates if group.has_stem and each.effect in (DRIFT, WANDER)]
         quick, imitated, slow = (
-            [each for each in candidates if each.tier == tier and each not in drifts]
-            for tier in range(3)
+            [each for each in candidates if each.tier == tier] for tier in range(3)
         )
-        imitated += drifts
+        # what rests show is led by single slips: that waits until the others have ended, too
+        told = [each for each in quick if shown.get(each.effect)]
+        quick = [each for each in quick if each not in told]
         if raced:
             runners, waiting = ([*raced], []) if promising(raced) else ([], [*raced])
         else:
-            runners = heat([], quick)
-            # where there is no gap nothing closes it
-            if runners and left >= FAINT and nearly_all(runners[0]):
-                effect = runners[0].candidates[-1].effect
-                imitated = [e for e in imitated if odds.look_alike(effect, e.effect)]
-            runners = heat(runners, imitated)
+            runners = []
+            for some in (quick, told, imitated):
+                # where there is no gap nothing closes it
+                if runners and left >= FAINT and nearly_all(runners[0]):
+                    effect = runners[0].candidates[-1].effect
+                    some = [each for each in some if odds.look_alike(effect, each.effect)]
+                runners = heat(runners, some)
         ended = sorted([*runners, *waiting], key=by_cost)
         mostly = bool(ended) and before.closed_by(whole(ended[0])) >= odds.MOSTLY
         hasty = hastily and ended and not nearly_all(ended[0])
         # in haste what explains most was deepened already
         if deeply and runners and (mostly if hasty else not (raced and mostly)):
             ended = runners = _deepened(
-                fitter, group, valve, runners, [*quick, *imitated], progress
+                fitter, group, valve, runners, [*quick, *told, *imitated], progress
             )
         if hasty and not nearly_all(ended[0]):
             return alike(fitter, group, ended)
