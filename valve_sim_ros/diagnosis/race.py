@@ -8,10 +8,6 @@ from dataclasses import replace
 from functools import partial
 import os
 
-import numpy as np
-from scipy.signal import periodogram
-
-from ..model.pipeline import Array
 from . import odds
 from .adequacy import Leftover, leftover
 from .alike import alike
@@ -29,6 +25,7 @@ from .seen import (
     SHAKES,
     STOPS,
     stops_seen,
+    swings_seen,
     WANDER,
 )
 from .stages import Candidate, Group
@@ -101,7 +98,7 @@ def _run(
         # whole slips would hide a swing
         residual = fitter.residuals(valve, group.signal, (*fitter.drive, RESTS))
         seen = {
-            'swings': _swings(fitter, residual),
+            'swings': swings_seen(fitter.bench, residual),
             'steps': tuple(step for step, _ in fitter.bench.grids_of_x),
             'offsets': tuple(offset for _, offset in fitter.bench.grids_of_x),
             **calibration_seen(fitter.bench, results),
@@ -183,20 +180,19 @@ def _run(
             gained = max((valve.cost - each.cost for each in runners), default=0.0)
             return not group.has_stem or gained >= PROMISING * gap
 
-        def heat(
-            ahead: list[Valve],
-            some: Sequence[Candidate],
-            begun: Callable[[Candidate], Valve] = begun,
-            *,
-            last: bool = False,
+        def all_begun(
+            some: Sequence[Candidate], how: Callable[[Candidate], Valve] = begun
         ) -> list[Valve]:
-            """Return the runners with some more, which are refitted as far as they lead.
+            return [*map(count, pool.map(how, some))]
+
+        def heat(ahead: list[Valve], fresh: list[Valve], *, last: bool = False) -> list[Valve]:
+            """Return the runners with fresh ones, which are refitted as far as they lead.
 
             If none of them is promising they wait for those of the next heat; in the last one they
             are followed only where too much is left to be called adequate.
             """
             nonlocal waiting
-            fresh = sorted([*waiting, *map(count, pool.map(begun, some))], key=by_cost)
+            fresh = sorted([*waiting, *fresh], key=by_cost)
             waiting = []
             if not fresh:
                 return ahead
@@ -219,31 +215,37 @@ def _run(
         def nearly_all(best: Valve) -> bool:
             return odds.nearly_all(before, whole(best))
 
+        def closes_most(some: Sequence[Valve]) -> bool:
+            best = min(some, key=by_cost, default=valve)
+            return before.closed_by(whole(best)) >= odds.MOSTLY
+
         if not group.has_stem and left < FAINT:  # behind nothing a law needs no more parameters
             candidates = [each for each in candidates if not each.extends(candidates)]
         quick, imitated, slow = (
             [each for each in candidates if each.tier == tier] for tier in range(3)
         )
-        # what rests show is led by single slips: that waits until the others have ended, too
+        # what rests show is led by single slips: that waits where others close most without
         told = [each for each in quick if shown.get(each.effect)]
-        quick = [each for each in quick if each not in told]
         if raced:
             runners, waiting = ([*raced], []) if promising(raced) else ([], [*raced])
         else:
-            runners = []
-            for some in (quick, told, imitated):
+            fresh = all_begun([each for each in quick if each not in told])
+            if not closes_most(fresh):
+                fresh, told = [*fresh, *all_begun(told)], []
+            runners = heat([], fresh)
+            for some in (told, imitated):
                 # where there is no gap nothing closes it
                 if runners and left >= FAINT and nearly_all(runners[0]):
                     effect = runners[0].candidates[-1].effect
                     some = [each for each in some if odds.look_alike(effect, each.effect)]
-                runners = heat(runners, some)
+                runners = heat(runners, all_begun(some))
         ended = sorted([*runners, *waiting], key=by_cost)
-        mostly = bool(ended) and before.closed_by(whole(ended[0])) >= odds.MOSTLY
+        mostly = closes_most(ended)
         hasty = hastily and ended and not nearly_all(ended[0])
         # in haste what explains most was deepened already
         if deeply and runners and (mostly if hasty else not (raced and mostly)):
             ended = runners = _deepened(
-                fitter, group, valve, runners, [*quick, *told, *imitated], progress
+                fitter, group, valve, runners, [*quick, *imitated], progress
             )
         if hasty and not nearly_all(ended[0]):
             return alike(fitter, group, ended)
@@ -256,8 +258,8 @@ def _run(
             slow = [e for e in slow if e in hidden or not e.laborious]
         # a law with one more parameter is tried only where the plain one leaves something
         further = [e for e in slow if group.has_stem and e.extends(slow)]
-        runners = heat(runners, [e for e in slow if e not in further], last=not further)
-        led = begun
+        runners = heat(runners, all_begun([e for e in slow if e not in further]), last=not further)
+        how = begun
         if runners:
             plain = runners[0]
             law = plain.candidates[-1]
@@ -266,10 +268,10 @@ def _run(
             elif law in slow and before.closed_by(whole(plain)) >= odds.MOSTLY:
                 further = [e for e in further if e.effect == law.effect]
 
-                def led(candidate: Candidate) -> Valve:
+                def how(candidate: Candidate) -> Valve:
                     return noted(_carried_on(fitter, group, plain, candidate))
 
-        runners = heat(runners, further, led, last=True)
+        runners = heat(runners, all_begun(further, how), last=True)
         if deeply:
             runners = _deepened(fitter, group, valve, runners, slow, progress)
     return alike(fitter, group, runners)
@@ -339,12 +341,3 @@ def rebased(fitter: Fitter, group: Group, valve: Valve, runners: Sequence[Valve]
     if group.has_stem and not odds.no_base(left, group):
         best = fitter.refined(best, problem)
     return min(valve, best, key=by_cost)
-
-
-def _swings(fitter: Fitter, residual: Array) -> tuple[float, ...]:
-    """Return the frequencies at which a residual swings most, and their neighbours [Hz]."""
-    period = float(np.median(np.diff(fitter.bench.stretches[0].time)))
-    frequency, power = periodogram(np.clip(residual, -10.0, 10.0), 1.0 / period)
-    inside = (frequency > 0.02) & (frequency < 0.45 / period)
-    tops = frequency[inside][np.argsort(-power[inside])[:3]]
-    return tuple(f + part * frequency[1] for f in tops for part in (-0.4, 0.0, 0.4))

@@ -7,6 +7,7 @@ import math
 
 import numpy as np
 from scipy.optimize import least_squares
+from scipy.signal import periodogram
 
 from ..model.drift import drifted
 from ..model.effects.dwell_friction import SHAPES
@@ -191,6 +192,18 @@ def shaken_seen(bench: Bench, held: float) -> list[dict[str, float]]:
         for early in EARLY
         for share in CARRIED
     ]
+
+
+def swings_seen(bench: Bench, residual: Array) -> tuple[float, ...]:
+    """Return the frequencies at which a residual swings most, and their neighbours [Hz].
+
+    `residual` of a signal over its noise, shape (n,).
+    """
+    period = float(np.median(np.diff(bench.stretches[0].time)))
+    frequency, power = periodogram(np.clip(residual, -10.0, 10.0), 1.0 / period)
+    inside = (frequency > 0.02) & (frequency < 0.45 / period)
+    tops = frequency[inside][np.argsort(-power[inside])[:3]]
+    return tuple(f + part * frequency[1] for f in tops for part in (-0.4, 0.0, 0.4))
 
 
 def stops_seen(bench: Bench, results: Sequence[Array]) -> list[dict[str, float]]:
