@@ -337,7 +337,6 @@ def rebased(fitter: Fitter, group: Group, valve: Valve, runners: Sequence[Valve]
         for r in runners
     ]
     best = min((fitter.fit(each, problem) for each in there), key=by_cost)
-    left = leftover(fitter.residuals(best, group.signal))
-    if group.has_stem and not odds.no_base(left, group):
+    if group.has_stem and not odds.no_base(leftover(fitter.residuals(best, group.signal)), group):
         best = fitter.refined(best, problem)
     return min(valve, best, key=by_cost)
