@@ -10,9 +10,8 @@ import pytest
 from scipy.signal import lfilter
 
 from valve_sim_ros import simulate
-from valve_sim_ros.diagnosis import diagnose, reconsidering
+from valve_sim_ros.diagnosis import diagnose, heats, odds, reconsidering
 from valve_sim_ros.diagnosis import ladder as climbing_up
-from valve_sim_ros.diagnosis import race as racing
 from valve_sim_ros.diagnosis.adequacy import Leftover, leftover
 from valve_sim_ros.diagnosis.base_valve import find_base, starting_valve
 from valve_sim_ros.diagnosis.bench import Bench
@@ -411,7 +410,7 @@ def test_a_law_with_one_more_parameter_is_tried_where_the_plain_one_leaves_somet
         tried.append(candidate.names)
         return replace(base, cost=left * base.cost, candidates=(candidate,))
 
-    monkeypatch.setattr(racing, 'screened', screened)
+    monkeypatch.setattr(heats, 'screened', screened)
     for how in ('evolve', 'fit', 'refined'):
         monkeypatch.setattr(Fitter, how, lambda self, valve, *rest: valve)
     noise = np.random.default_rng(0).standard_normal(2000)
@@ -427,18 +426,65 @@ def test_a_law_with_one_more_parameter_is_tried_where_the_plain_one_leaves_somet
 
 def test_a_laborious_effect_does_not_run_where_another_explains_the_signal(monkeypatch):
     fitter, base = fitted(measured(**{'travel_stops.upper': 60.0}))
-    screened = racing.screened
+    screened = heats.screened
     tried = []
 
     def noted(fitter, candidate, *more):
         tried.append(candidate.effect)
         return screened(fitter, candidate, *more)
 
-    monkeypatch.setattr(racing, 'screened', noted)
+    monkeypatch.setattr(heats, 'screened', noted)
     some = [c for c in STEM.candidates() if c.effect in ('travel_stops', 'stribeck_friction')]
     found = race(fitter, STEM, base, some)
     assert found == sorted(found, key=by_cost)
     assert set(tried) == {'travel_stops'}
+
+
+@pytest.mark.parametrize(('closes', 'waits'), [(0.99, True), (0.5, False)])
+def test_what_rests_show_waits_where_another_effect_closes_most(closes, waits, monkeypatch):
+    fitter, base = fitted(measured(**{'travel_stops.upper': 60.0}))
+    done = []
+
+    def screened(fitter, candidate, *rest):
+        done.append(candidate.effect)
+        return replace(base, cost=(1.0 - closes) * base.cost, candidates=(candidate,))
+
+    def evolve(self, valve, *rest):
+        done.append('heat')
+        return valve
+
+    monkeypatch.setattr(heats, 'screened', screened)
+    monkeypatch.setattr(Fitter, 'evolve', evolve)
+    for how in ('fit', 'refined'):
+        monkeypatch.setattr(Fitter, how, lambda self, valve, *rest: valve)
+    found = fitter.residuals(base, 'x')
+
+    def residuals(self, valve, *rest):
+        return found * (1.0 - closes) ** 0.5 if valve.candidates else found
+
+    monkeypatch.setattr(Fitter, 'residuals', residuals)
+    names = ('travel_stops', 'fluid_force')
+    race(fitter, STEM, base, [each for each in STEM.candidates() if each.effect in names])
+    assert {*names} <= {*done}
+    assert (done.index('heat') < done.index('travel_stops')) == waits
+
+
+@pytest.mark.parametrize(('beyond', 'longer'), [(10.0, False), (np.inf, True)])
+def test_no_longer_search_for_a_base_valve_follows_one_that_leaves_far_too_much(
+    beyond, longer, monkeypatch
+):
+    monkeypatch.setattr(odds, 'NO_BASE', beyond)
+    fitter, base = fitted(measured(hold=150, **{'sensor_drift.rate': 20.0}))
+    refined = []
+
+    def noted(self, valve, problem):
+        refined.append(valve)
+        return valve
+
+    monkeypatch.setattr(Fitter, 'refined', noted)
+    found = find_base(fitter, STEM, base, fitter.drive)
+    assert leftover(fitter.residuals(found, 'x')).excess > 10.0
+    assert bool(refined) == longer
 
 
 def test_where_there_is_no_gap_what_a_base_valve_imitates_is_tried(monkeypatch):
@@ -449,7 +495,7 @@ def test_where_there_is_no_gap_what_a_base_valve_imitates_is_tried(monkeypatch):
         tried.append(candidate.effect)
         return replace(base, effects=(candidate.effect,), candidates=(candidate,))
 
-    monkeypatch.setattr(racing, 'screened', screened)
+    monkeypatch.setattr(heats, 'screened', screened)
     monkeypatch.setattr(Fitter, 'residuals', lambda *_: np.random.default_rng(0).normal(size=2000))
     for how in ('evolve', 'fit', 'refined'):
         monkeypatch.setattr(Fitter, how, lambda self, valve, *rest: valve)
@@ -528,7 +574,7 @@ def test_where_nothing_is_left_stribeck_friction_is_sought_beside_a_rare_base_va
         tried.append(candidate.effect)
         return replace(base, cost=1.0, candidates=(candidate,))
 
-    monkeypatch.setattr(racing, 'screened', screened)
+    monkeypatch.setattr(heats, 'screened', screened)
     monkeypatch.setattr(Fitter, 'evolve', lambda self, valve, *rest: valve)
     monkeypatch.setattr(Fitter, 'fit', lambda self, valve, *rest: valve)
     rare = replace(base, values={**base.values, 'f_d/f_s': drop})

@@ -3,13 +3,12 @@
 """Effects that look like the best of a race, sought from where that ended."""
 
 from collections.abc import Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
-import os
 
 from . import odds
 from .adequacy import leftover
 from .fitting import by_cost, Fitter, Valve
 from .stages import Candidate, Group
+from .workers import each_on_its_own
 
 NEAR = 10.0
 """Beside the best one that costs so many times more is no twin, however long it is sought."""
@@ -37,8 +36,7 @@ def alike(fitter: Fitter, group: Group, runners: Sequence[Valve]) -> list[Valve]
             there = min(there, fitter.refined(there, problem), key=by_cost)
         return there
 
-    with ThreadPoolExecutor(os.cpu_count()) as pool:  # compiled runs release the lock
-        return sorted(pool.map(sought, runners), key=by_cost)
+    return sorted(each_on_its_own(sought, runners), key=by_cost)
 
 
 def _same(best: Valve, candidate: Candidate, base: Mapping[str, float]) -> list[dict[str, float]]:

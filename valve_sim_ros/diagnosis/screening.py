@@ -10,10 +10,11 @@ import numpy as np
 from ..model.effects import CATALOGUE
 from . import odds
 from .base_valve import with_any_stem
+from .clues import Clues
 from .fitting import by_cost, eased, Fitter, LONG, Problem, SHORT, Valve
 from .single_slips import DESCENT, slip_by_slip
 from .stages import Candidate, Group
-from .starts import KINETIC
+from .starts import KINETIC, Starts
 from .stretch import PUT_TO_REST, RESTS
 
 MOST_STARTS, FEWER_STARTS = 24, 8
@@ -22,25 +23,16 @@ so many of the best."""
 SCREENED, SCREENED_IF_SMOOTH = 3, 8
 """How many starts of a candidate are followed (more without a stem: such fits are quick)."""
 
-Bases = list[dict[str, float]]
-
 
 def screened(
     fitter: Fitter,
     candidate: Candidate,
     group: Group,
     valve: Valve,
-    own: Sequence[dict[str, float]],
-    suited: Sequence[dict[str, float]],
-    frictions: Bases,
-    lags: Bases,
-    held: float,
+    clues: Clues,
 ) -> Valve:
-    """Return the valve with one more effect after a short refit of its group.
-
-    `own` are starts of the effect, `suited` those that the data show, as they do what holds the
-    stem, `held` [% of span].
-    """
+    """Return the valve with one more effect after a short refit of its group."""
+    own, suited = clues.own(candidate), clues.suited(candidate)
     there = replace(
         valve,
         effects=tuple(dict.fromkeys((*valve.effects, candidate.effect))),
@@ -55,22 +47,22 @@ def screened(
         own = [own[index] for index in np.unique(costs, return_index=True)[1][:FEWER_STARTS]]
     own = [*own, *suited]
 
-    levels = [level for level in (usual['f_s'], held) if level > 0.0]
+    levels = [level for level in (usual['f_s'], clues.held) if level > 0.0]
 
-    def balanced(start: Mapping[str, float]) -> Bases:
+    def balanced(start: Mapping[str, float]) -> Starts:
         each = [candidate.balanced(level, usual, start) for level in levels]
         # held as before, the stem may slip as before or further
         further = [{**some[0], **share} for some in each if some for share in KINETIC]
         return [*(one for some in each for one in some), *further] or [{}]
 
-    def around(bases: Bases) -> list[Bases]:
+    def around(bases: Starts) -> list[Starts]:
         each = [balanced(start) for start in own]
         return [
             [{**usual, **base, **start} for base in (*some, *bases)]
             for some, start in zip(each, own, strict=True)
         ]
 
-    def best(starts: Sequence[Bases], way: Problem, count: int) -> list[Valve]:
+    def best(starts: Sequence[Starts], way: Problem, count: int) -> list[Valve]:
         each = [fitter.scan(there, some, way)[0] for some in starts]
         best = sorted(each, key=by_cost)[:count]
         # without the effect a stem may have been found that creeps instead of swinging
@@ -85,13 +77,13 @@ def screened(
         found = [replace(there, values={**usual, **start}), *fitter.scan(there, held_alike, way)]
         return min((fitter.fit(one, way, DESCENT) for one in found), key=by_cost)
 
-    starts = around(frictions if group.has_stem else lags)
+    starts = around(clues.frictions if group.has_stem else clues.lags)
     found = best(starts, problem, SCREENED if group.has_stem else SCREENED_IF_SMOOTH)
     first = not group.unknowns_of(valve.candidates)
     if group.has_stem and not first:
         found += sorted(map(descended, own), key=by_cost)[:SCREENED]
-    if group.has_stem and lags != [{}] and first:
-        anew = [some[1:] for some in around(lags)]
+    if group.has_stem and clues.lags != [{}] and first:
+        anew = [some[1:] for some in around(clues.lags)]
         found += [fitter.fit(each, way, SHORT) for each in best(anew, way, 1)]
     effect = CATALOGUE[candidate.effect]
     # in a second look the stem is put to rest for all, and beside another effect it takes long
@@ -102,7 +94,7 @@ def screened(
     odd = odds.imitates(valve, candidate.effect)
     if some and (odd or (not led and (first or effect.rugged))):
         each = [one for each in some for one in each]
-        found += slip_by_slip(fitter, there, each, problem, held)
+        found += slip_by_slip(fitter, there, each, problem, clues.held)
     elif way != problem:
         found += [fitter.fit(each, way, SHORT) for each in best(starts, way, 1)]
     steps = SHORT if group.has_stem else LONG

@@ -14,6 +14,7 @@ from ..model.effects.dwell_friction import SHAPES
 from ..model.pipeline import Array
 from .bench import Bench
 from .readings import answers_to_steps
+from .starts import Starts
 from .stretch import Stretch
 
 ENOUGH_STEPS, LEAST_EACH = 6, 2
@@ -82,7 +83,7 @@ def calibration_seen(bench: Bench, results: Sequence[Array]) -> dict[str, tuple[
     return {'zeros': (0.0, -span * middle), 'spans': (1.0, span)}
 
 
-def dwell_seen(bench: Bench, results: Sequence[Array]) -> list[dict[str, float]]:
+def dwell_seen(bench: Bench, results: Sequence[Array]) -> Starts:
     """Return starts of a friction that grows with the time at rest, one of each form of its law.
 
     From what holds the stem when it leaves each rest: static friction and growth are straight in
@@ -116,7 +117,7 @@ def dwell_seen(bench: Bench, results: Sequence[Array]) -> list[dict[str, float]]
 
 def drift_seen(
     bench: Bench, results: Sequence[Array], effect: str = DRIFT, scatters: float = 1.0
-) -> list[dict[str, float]]:
+) -> Starts:
     """Return starts of a friction or a sensor that drifts, one for each form of the law.
 
     From what holds the stem when it leaves each rest: it is straight in the drift, how soon that
@@ -150,7 +151,7 @@ def drift_seen(
     return found
 
 
-def shaken_seen(bench: Bench, held: float) -> list[dict[str, float]]:
+def shaken_seen(bench: Bench, held: float) -> Starts:
     """Return starts of a periodic force on the stem, from the moments at which the stem slips.
 
     A force that shakes a resting stem lets it go up near its crests and down near its troughs:
@@ -206,7 +207,7 @@ def swings_seen(bench: Bench, residual: Array) -> tuple[float, ...]:
     return tuple(f + part * frequency[1] for f in tops for part in (-0.4, 0.0, 0.4))
 
 
-def stops_seen(bench: Bench, results: Sequence[Array]) -> list[dict[str, float]]:
+def stops_seen(bench: Bench, results: Sequence[Array]) -> Starts:
     """Return starts of stops, hard and yielding: where the stem rests outermost, whatever p2 does.
 
     `results` as for `friction_seen`; none if p2 moves the stem there as it does elsewhere.

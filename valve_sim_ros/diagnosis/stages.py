@@ -9,6 +9,7 @@ import math
 
 from ..model.declarations import EffectParameter
 from ..model.effects import CATALOGUE
+from .starts import Starts
 from .unknowns import (
     BASE_UNKNOWNS,
     declared,
@@ -64,7 +65,7 @@ class Candidate:
         """Number of places in which a search looks for it."""
         return math.prod(len(starts_of(declared(self.effect, name))) for name in self.names)
 
-    def starts(self, seen: Mapping[str, tuple[float, ...]]) -> list[dict[str, float]]:
+    def starts(self, seen: Mapping[str, tuple[float, ...]]) -> Starts:
         """Return the values from which a search starts, the others neutral.
 
         Parameters that the data show directly start as `seen` there.
@@ -76,7 +77,7 @@ class Candidate:
             {**self.neutral, **dict(zip(names, values, strict=True))} for values in product(*each)
         ]
 
-    def suited(self, starts: Iterable[Mapping[str, float]]) -> list[dict[str, float]]:
+    def suited(self, starts: Iterable[Mapping[str, float]]) -> Starts:
         """Return the starts of the effect in which what a fit does not free is neutral."""
         fixed = {f'{self.effect}.{name}' for name in self.names} ^ {*self.neutral}
         return [
@@ -87,7 +88,7 @@ class Candidate:
 
     def balanced(
         self, level: float, values: Mapping[str, float], start: Mapping[str, float]
-    ) -> list[dict[str, float]]:
+    ) -> Starts:
         """Return frictions with which a start holds the stem as a level [%] does without it.
 
         The stem moves, or it slips, as it does with `values`; none if that is not declared.

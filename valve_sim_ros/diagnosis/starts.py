@@ -11,6 +11,8 @@ from scipy.stats import qmc
 from ..model.parameters import DELTA
 from .unknowns import Unknown
 
+Starts = list[dict[str, float]]
+
 START: dict[str, float] = {
     'f_d1': 0.5,
     'T_g1': 5.0,
@@ -75,16 +77,14 @@ AROUND = (0.9, 1.0)
 """Shares of the friction that the data show from which a search starts."""
 
 
-def grid(unknowns: Sequence[Unknown]) -> list[dict[str, float]]:
+def grid(unknowns: Sequence[Unknown]) -> Starts:
     """Return the starts of the base valve's unknowns."""
     names = [unknown.name for unknown in unknowns if unknown.name in GRID]
     values = STEM_GRID if set(names) == set(STEM_GRID) else GRID
     return [dict(zip(names, point, strict=True)) for point in product(*(values[n] for n in names))]
 
 
-def nearby(
-    values: Mapping[str, float], unknowns: Sequence[Unknown], fineness: int
-) -> list[dict[str, float]]:
+def nearby(values: Mapping[str, float], unknowns: Sequence[Unknown], fineness: int) -> Starts:
     """Return 2 to the `fineness` starts around a valve, scattered evenly.
 
     Their frictions, lags, stems and parameters of effects differ.
@@ -101,7 +101,7 @@ def nearby(
 
 def sliding(
     starts: Sequence[Mapping[str, float]], names: Sequence[str], level: float, fineness: int
-) -> list[dict[str, float]]:
+) -> Starts:
     """Return 2 to the `fineness` starts of a friction that falls with speed, scattered evenly.
 
     `names` are the parameters of its law, `level` is what seems to hold the stem [% of span].
@@ -116,7 +116,7 @@ def sliding(
 
 def _scattered(
     values: Mapping[str, float], spans: Mapping[str, tuple[float, float]], fineness: int
-) -> list[dict[str, float]]:
+) -> Starts:
     """Return 2 to the `fineness` values, scattered evenly over the logarithms of these spans."""
     low, high = np.log(list(spans.values())).T
     points = qmc.Sobol(len(spans), scramble=False).random_base2(fineness)
@@ -124,7 +124,7 @@ def _scattered(
     return [{**values, **dict(zip(spans, point, strict=True))} for point in each]
 
 
-def friction_grid(seen: float) -> list[dict[str, float]]:
+def friction_grid(seen: float) -> Starts:
     """Return starts of the friction, which a valve without the effect may have far off.
 
     `seen` is what holds the stem as the data show it [% of span], NaN if they do not.

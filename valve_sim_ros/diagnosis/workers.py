@@ -3,7 +3,7 @@
 """One pool for the runs of a search: compiled runs release the lock."""
 
 from bisect import insort
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 import math
 import os
@@ -40,6 +40,12 @@ def at_once(run: Callable[[Item], Result], items: Iterable[Item]) -> list[Result
             if not helper.cancel():
                 helper.result()
     return [found[index] for index in range(len(each))]
+
+
+def each_on_its_own(search: Callable[[Item], Result], items: Iterable[Item]) -> Iterator[Result]:
+    """Return what each search makes of its item, in order: searches wait for runs of their own."""
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        yield from pool.map(search, items)
 
 
 def cheapest(
