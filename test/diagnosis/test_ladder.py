@@ -158,6 +158,19 @@ def test_a_base_valve_that_is_rare_passes_for_an_effect(effect, odd):
     assert not imitates(there, 'dwell_friction')
 
 
+@pytest.mark.parametrize(('height', 'ends'), [(10.0, True), (9.0, False)])
+def test_a_bump_of_friction_as_high_as_can_be_stands_for_a_stop(height, ends):
+    valve = starting_valve(Bench([measured()]))
+    bump = next(c for c in STEM.candidates() if 'height' in c.names)
+    values = {**valve.values, **bump.neutral, f'{bump.effect}.height': height}
+    there = replace(valve, values=values, candidates=(bump,))
+    assert odds.at_limit(there, [bump.effect]) == ends
+    ladder = ladder_of('adequate', left(60.0), left(0.1), bump.effect)
+    assert concluded(replace(ladder, valve=there)).outcome == (
+        'unknown_effect' if ends else 'missing_effect'
+    )
+
+
 def test_jitter_may_leave_more_of_p2():
     assert explained('p2', left(4.4), left(0.4), ['quick_exhaust'])
     assert not explained('x', left(4.4), left(0.4), ['quick_exhaust'])

@@ -55,6 +55,7 @@ EFFECT = Effect(
             'linear',
             'Relative extra friction at the bump',
             starts=(0.6, 2.0),
+            usual=(0.3, 3.0),
         ),
         EffectParameter(
             'centre',
