@@ -128,13 +128,15 @@ def find_base(
         return stopping
     # caught where it is far from its rest, a stem that slips too late is only a little wrong
     way = eased(problem)[0]
-    if len(group.stages) == 1 and way != problem:
-        found += slip_by_slip(fitter, valve, starts, problem)
-        best = min(found, key=by_cost)
-        left = leftover(fitter.residuals(best, group.signal, drive))
+    if way != problem:
+        stem_only = len(group.stages) == 1
+        if stem_only:
+            found += slip_by_slip(fitter, valve, starts, problem)
+            best = min(found, key=by_cost)
+            left = leftover(fitter.residuals(best, group.signal, drive))
         if odds.no_base(left, group):
             return best
-        if not (closely or odds.suspicious(left, group, fitter.bench.mixed)):
+        if stem_only and not (closely or odds.suspicious(left, group, fitter.bench.mixed)):
             return fitter.refined(best, problem)
     eases = found if way == problem else followed(way)
     rested = [fitter.evolve(each, way, GENERATIONS, NARROW) for each in eases]

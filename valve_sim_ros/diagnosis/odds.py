@@ -31,9 +31,10 @@ MORE_FAR = 10
 """So many errors beyond any noise are as good a reason to look for it as an excess."""
 SPOTLESS = 0.1
 """Excess that is nothing but noise."""
-NO_BASE = 10.0
-"""Excess of x, driven by p2, beyond which no longer search leads to a base valve that explains it:
-100 clean records leave at most 4.5 before."""
+NO_BASE, NO_BASE_ALONE = 10.0, 4.0
+"""Excess of x, driven by p2 and measured alone, beyond which no longer search for a base valve
+precedes the race. 100 clean records leave at most 4.5 of the former; of 102 of x alone 15 leave 4
+to 12: effects lead to their base valve then, see `race.rebased`."""
 NEGLIGIBLE = 1.0 / 3.0
 """An effect of less than this part of its least usual size is another run of the base valve."""
 LOOP, BLURRED = 'positioner_loop', 0.7
@@ -98,14 +99,21 @@ def suspicious(left: Leftover, group: Group, mixed: bool) -> bool:
     """Tell whether what the base valve leaves of a signal makes it worth to look for an effect."""
     least = (LEAST_IF_MIXED if mixed else LEAST_EXCESS)[group.signal]
     if group.has_stem:
-        alone = 'u-p1' in group.stages
-        return left.excess >= (LEAST_IF_ALONE if alone else least) or left.far >= LEAST_FAR
+        least = LEAST_IF_ALONE if x_alone(group) else least
+        return left.excess >= least or left.far >= LEAST_FAR
     return left.excess >= least or coloured(group, left)
 
 
 def no_base(left: Leftover, group: Group) -> bool:
-    """Tell whether what a base valve leaves of x is more than a longer search for one mends."""
-    return group.stages == ('p2-x',) and left.excess > NO_BASE
+    """Tell whether x is left so far off that effects are tried before a longer search."""
+    if group.stages == ('p2-x',):
+        return left.excess > NO_BASE
+    return x_alone(group) and left.excess > NO_BASE_ALONE
+
+
+def x_alone(group: Group) -> bool:
+    """Tell whether neither p1 nor p2 is measured."""
+    return group.has_stem and 'u-p1' in group.stages
 
 
 def coloured(group: Group, left: Leftover) -> bool:
