@@ -54,6 +54,8 @@ class Heats:
         What every search ended with, in whatever order.
     runners, waiting : list of Valve
         What the heats so far ended with, best first; and those that wait for the next one.
+    begun : int
+        How many candidates have begun.
     """
 
     fitter: Fitter
