@@ -8,6 +8,7 @@ from . import odds
 from .adequacy import leftover
 from .fitting import by_cost, Fitter, Valve
 from .stages import Candidate, Group
+from .starts import Starts
 from .workers import each_on_its_own
 
 NEAR = 10.0
@@ -39,7 +40,7 @@ def alike(fitter: Fitter, group: Group, runners: Sequence[Valve]) -> list[Valve]
     return sorted(each_on_its_own(sought, runners), key=by_cost)
 
 
-def _same(best: Valve, candidate: Candidate, base: Mapping[str, float]) -> list[dict[str, float]]:
+def _same(best: Valve, candidate: Candidate, base: Mapping[str, float]) -> Starts:
     """Return what one effect is as another one with parameters of the same names.
 
     All is linear but for friction: zero and span of the converter do to x what those of the sensor

@@ -28,7 +28,7 @@ from .fitting import (
 from .seen import friction_seen, mixed_arrivals
 from .single_slips import FINEST, slip_by_slip
 from .stages import Group
-from .starts import friction_grid, grid, nearby, START, STEMS, SWEEP
+from .starts import friction_grid, grid, nearby, START, Starts, STEMS, SWEEP
 from .stretch import PUT_TO_REST
 from .unknowns import BLEND, EARLY, LATE, LEAD, PHASE, STANDSTILL, Unknown
 
@@ -263,7 +263,7 @@ def on_time(fitter: Fitter, group: Group, valve: Valve) -> Leftover:
     return leftover(fitter.residuals(valve, group.signal, way[2]))
 
 
-def _apart(starts: Sequence[dict[str, float]], name: str) -> list[list[dict[str, float]]]:
+def _apart(starts: Starts, name: str) -> list[Starts]:
     """Return the starts in groups of one value of an unknown each."""
     levels = dict.fromkeys(start[name] for start in starts)
     return [[start for start in starts if start[name] == level] for level in levels]

@@ -34,7 +34,7 @@ SPOTLESS = 0.1
 NO_BASE, NO_BASE_ALONE = 10.0, 4.0
 """Excess of x, driven by p2 and measured alone, beyond which no longer search for a base valve
 precedes the race. 100 clean records leave at most 4.5 of the former; of 102 of x alone 15 leave 4
-to 12: effects lead to their base valve then, see `race.rebased`."""
+to 12: effects led 12 of 13 of these to their base valve, see `race.rebased`."""
 NEGLIGIBLE = 1.0 / 3.0
 """An effect of less than this part of its least usual size is another run of the base valve."""
 LOOP, BLURRED = 'positioner_loop', 0.7

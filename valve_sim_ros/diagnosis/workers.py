@@ -1,6 +1,6 @@
 # Copyright 2026 The valve_sim_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""One pool for the runs of a search: compiled runs release the lock."""
+"""Threads for runs and for searches: compiled runs release the lock."""
 
 from bisect import insort
 from collections.abc import Callable, Iterable, Iterator
