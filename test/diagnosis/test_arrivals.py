@@ -153,7 +153,24 @@ def test_a_swing_that_is_late_by_a_part_of_a_period_is_no_lag():
 
 def test_commands_that_go_on_between_samples_are_no_effect_beside_steps():
     """Ramps are followed between two samples, steps come with them."""
-    rng, fine = np.random.default_rng(2), 10
+    found = diagnose([ramps_and_steps()])
+    assert found.verdict == 'adequate'
+    assert found.base_valve.values['lead'] == pytest.approx(0.45, abs=0.05)
+    assert found.ladders[1].before.excess < 0.05
+
+
+def test_a_dead_time_below_a_period_is_no_lag_where_ramps_go_on_between_samples():
+    """Steps show it at the next sample, ramps as it is: a lag would be over by then."""
+    effect = {'effects': ['ip_dead_time'], 'ip_dead_time.dead_time': 0.25}
+    found = diagnose([ramps_and_steps(**effect)])
+    assert [named.rung.effect for named in found.effects] == ['ip_dead_time']
+    assert found.ladders[0].after.excess < 0.05
+    assert found.augmented_valve.values['ip_dead_time.dead_time'] == pytest.approx(0.25, abs=0.1)
+
+
+def ramps_and_steps(fine=10, **effect):
+    """Return a record of 0.5 s samples of commands that came ten times as often."""
+    rng = np.random.default_rng(2)
     levels = rng.uniform(10.0, 90.0, 30)
     pieces = [np.full(40 * fine, levels[0])]
     for before, after in itertools.pairwise(levels):
@@ -162,10 +179,7 @@ def test_commands_that_go_on_between_samples_are_no_effect_beside_steps():
         pieces += [np.full(size, level) for level in rng.uniform(10.0, 90.0, 2)]
         pieces += [np.full(size, after)]
     u = np.concatenate(pieces)
-    run = simulate(u, 0.05, QUICK)
+    run = simulate(u, 0.05, {**QUICK, **effect})
     seen = slice(None, None, fine)
     noisy = [each[seen] + 0.2 * rng.standard_normal(each[seen].size) for each in (run.p1, run.p2)]
-    found = diagnose([Recording(run.t[seen], u[seen], *noisy)])
-    assert found.verdict == 'adequate'
-    assert found.base_valve.values['lead'] == pytest.approx(0.45, abs=0.05)
-    assert found.ladders[1].before.excess < 0.05
+    return Recording(run.t[seen], u[seen], *noisy)

@@ -202,8 +202,9 @@ class Stretch:
 
 
 def blended(u: Array, share: float) -> Array:
-    """Return commands that go on from sample to sample late by a share of a period."""
-    return np.where(goes_on(u), (1.0 - share) * u + share * np.concatenate([u[:1], u[:-1]]), u)
+    """Return commands that go on and on late by a share of a period, sooner if it is negative."""
+    other = np.concatenate([u[:1], u[:-1]] if share > 0.0 else [u[1:], u[-1:]])
+    return np.where(goes_on(u), (1.0 - abs(share)) * u + abs(share) * other, u)
 
 
 def goes_on(u: Array) -> npt.NDArray[np.bool_]:

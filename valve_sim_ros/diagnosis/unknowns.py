@@ -65,8 +65,8 @@ PHASE = Unknown('phase', -1.0, 0.999, 'linear', 0.1)
 """Share of a sample period by which a command acts before the sample that shows it."""
 EARLY = Unknown('phase', 0.0, 0.999, 'linear', 0.1)
 LATE = Unknown('phase', -1.0, -0.001, 'linear', 0.1)
-BLEND = Unknown('blend', 0.0, 0.999, 'linear', 0.1)
-"""Share of a period by which a command that goes on and on reaches p1 late."""
+BLEND = Unknown('blend', -0.999, 0.999, 'linear', 0.1)
+"""Share of a period by which a command that goes on and on reaches p1 late; negative: sooner."""
 LEAD = Unknown('lead', 0.0, 0.999, 'linear', 0.1)
 """Share of a period by which its changes come sooner than steps: it goes on between samples."""
 STANDSTILL = _log(DELTA.name, DELTA.default, 0.15, 0.3)

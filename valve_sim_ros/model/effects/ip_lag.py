@@ -60,6 +60,7 @@ EFFECT = Effect(
             'linear',
             'Time constant of p1 after u',
             starts=(0.2, 0.7, 2.0),
+            usual=(0.05, 4.0),
         ),
         upstream(1.0),
     ),
