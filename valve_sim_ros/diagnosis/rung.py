@@ -58,8 +58,13 @@ def judged(
     if not runners:
         return None
     best_after = leftover(fitter.residuals(runners[0], group.signal))
-    tops = odds.best_per_effect(runners)
-    gains = {each.candidates[-1].effect: odds.gain(now.cost, each, best_after) for each in tops}
+
+    def evidence(runner: Valve) -> float:
+        return odds.gain(now.cost, runner, best_after)
+
+    # an effect's plainer law may cost a little more, and yet have more evidence
+    tops = odds.best_per_effect(sorted(runners, key=evidence, reverse=True))
+    gains = {each.candidates[-1].effect: evidence(each) for each in tops}
     best = odds.choice(tops, gains)
     candidate = best.candidates[-1]
     after = leftover(fitter.residuals(best, group.signal))
