@@ -21,6 +21,8 @@ ROUNDS = ((40, 5), (10, 14), (4, 30))
 """Rounds of a race where costs are rugged: how many still run, and for how many generations."""
 FINISHERS, REFINED = 5, 2
 """How many runners are refitted, and refined to the end."""
+OUTRUN = 2.0
+"""What a runner may cost to be searched for longer [cost of the best]."""
 FAR_AHEAD, BEHIND = 0.2, 0.5
 """Where the best leaves no more than this part of the cost, or nothing but noise, runners short of
 more than a part of its gain are not followed."""
@@ -137,8 +139,9 @@ class Heats:
         runners = sorted([*ahead, *fresh], key=by_cost)
         runners = self._followed(self._fitted, runners, FINISHERS, ahead)
         if self.group.has_stem:
-            near = sum(self.left_by(each).excess <= odds.CLEAN for each in runners[:REFINED])
-            runners = self._followed(self._refined, runners, near or REFINED, ahead)
+            some = [each for each in runners[:REFINED] if each.cost <= OUTRUN * runners[0].cost]
+            near = sum(self.left_by(each).excess <= odds.CLEAN for each in some)
+            runners = self._followed(self._refined, runners, near or len(some), ahead)
         self.runners = runners
 
     def _noted(self, search: Callable[[Start], Valve]) -> Callable[[Start], Valve]:

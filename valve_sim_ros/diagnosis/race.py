@@ -11,12 +11,12 @@ from .alike import alike
 from .base_valve import find_base
 from .clues import clues
 from .fitting import by_cost, FAINT, Fitter, Valve
-from .heats import FAR_AHEAD, Heats, in_reach
+from .heats import FAR_AHEAD, Heats, in_reach, OUTRUN
 from .stages import Candidate, Group
+from .stretch import PUT_TO_REST
 
-DEEPENED, OUTRUN = 3, 2.0
-"""So many effects are searched more deeply where none explains what is left, none of which costs
-more than this [cost of the best]."""
+DEEPENED = 3
+"""So many effects are searched more deeply where none explains what is left."""
 
 
 def race(
@@ -73,6 +73,10 @@ def _run(
         heats.runners = raced
     else:
         heats.waiting = raced
+    alone = len(group.stages) == 1 and PUT_TO_REST.isdisjoint(fitter.drive)
+    if hastily and alone and not raced and heats.ended:
+        # one whose search takes long may explain all: before others are deepened in vain
+        _run_slow(heats, slow, plainly=True)
     ended = heats.ended
     hasty = hastily and ended and not heats.nearly_all(ended[0])
     mostly = heats.most(ended)
@@ -81,7 +85,7 @@ def _run(
         ended = heats.runners = _deepened(heats, [*quick, *imitated])
     if hasty and not heats.nearly_all(ended[0]):
         return alike(fitter, group, ended)
-    _run_slow(heats, slow, ended[0] if ended else valve)
+    _run_slow(heats, slow)
     if deeply:
         heats.runners = _deepened(heats, slow)
     return alike(fitter, group, heats.runners)
@@ -103,27 +107,37 @@ def _run_quick(heats: Heats, quick: Sequence[Candidate], imitated: Sequence[Cand
         heats.run(heats.screen(some))
 
 
-def _run_slow(heats: Heats, slow: Sequence[Candidate], best: Valve) -> None:
-    """Run the heats of effects whose search takes long, as far as the `best` leaves a reason."""
+def _run_slow(heats: Heats, slow: Sequence[Candidate], *, plainly: bool = False) -> None:
+    """Run the heats of effects whose search takes long, as far as the others leave a reason.
+
+    Those begun before are not begun again; `plainly` leaves out laws that have one more parameter.
+    """
     group, valve, left = heats.group, heats.valve, heats.before.excess
+    best = next(iter(heats.ended), valve)
     hidden = [each for each in slow if left < FAINT and odds.imitates(valve, each.effect)]
     if heats.nearly_all(best):
         slow = [each for each in slow if each in hidden or _like(best, each)]
-    elif best is not valve and left < (odds.CLEAN if valve.candidates else odds.SPOTLESS):
+    elif best is not valve and left < (odds.CLEAN if valve.candidates else FAINT):
         slow = [each for each in slow if each in hidden or not each.laborious]
     # a law with one more parameter is tried only where the plain one leaves something
     further = [each for each in slow if group.has_stem and each.extends(slow)]
-    heats.run(heats.screen([e for e in slow if e not in further]), last=not further)
+    begun = [*further, *(each.candidates[-1] for each in heats.ended)]
+    plain = heats.screen([each for each in slow if each not in begun])
+    heats.run(plain, last=not (further or plainly))
+    if plainly:
+        return
+    fresh = []
     if heats.runners:
-        plain = heats.runners[0]
-        law, after = plain.candidates[-1], heats.left_by(plain)
-        if heats.nearly_all(plain) or (law in slow and after.excess <= odds.SPOTLESS):
+        best = heats.runners[0]
+        law, after = best.candidates[-1], heats.left_by(best)
+        if heats.nearly_all(best) or (law in slow and after.excess <= odds.SPOTLESS):
             further = []
-        elif law in slow and heats.before.closed_by(after) >= odds.MOSTLY:
+        elif law in slow:
             own = [each for each in further if each.effect == law.effect]
-            heats.run(heats.extend(plain, own), last=True)
-            return
-    heats.run(heats.screen(further), last=True)
+            fresh = heats.extend(best, own)
+            mostly = heats.before.closed_by(after) >= odds.MOSTLY
+            further = [] if mostly else [each for each in further if each not in own]
+    heats.run([*fresh, *heats.screen(further)], last=True)
 
 
 def _like(best: Valve, candidate: Candidate) -> bool:

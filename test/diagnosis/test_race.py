@@ -1,0 +1,89 @@
+# Copyright 2026 The valve_sim_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The order in which effects race, and how long each of them is followed."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from valve_sim_ros import simulate
+from valve_sim_ros.diagnosis import heats, odds
+from valve_sim_ros.diagnosis.adequacy import leftover
+from valve_sim_ros.diagnosis.base_valve import starting_valve
+from valve_sim_ros.diagnosis.bench import Bench
+from valve_sim_ros.diagnosis.fitting import FAINT, Fitter
+from valve_sim_ros.diagnosis.race import race
+from valve_sim_ros.diagnosis.stages import groups
+from valve_sim_ros.recordings.recording import Recording
+
+STEM = groups(('p1', 'p2', 'x'))[-1]
+LABORIOUS, QUICK = 'stribeck_friction', 'fluid_force'
+
+
+@pytest.fixture
+def steps(monkeypatch):
+    """Return what names the steps of a race in which each effect closes a share of the gap."""
+
+    def run(closes, gap=50.0, **how):
+        u = np.repeat(np.random.default_rng(5).uniform(10.0, 90.0, 40), 50)
+        s = simulate(u)
+        fitter = Fitter(Bench([Recording(s.t, u, s.p1, s.p2, s.x)]))
+        base = replace(starting_valve(fitter.bench), cost=1e5)
+        noise = np.random.default_rng(0).standard_normal(u.size)
+        misfit = gap**0.5 * np.sin(0.01 * np.arange(u.size)) * (np.arange(u.size) % 400 > 150)
+        done = []
+
+        def share(valve):
+            return closes[valve.candidates[-1].effect] if valve.candidates else 0.0
+
+        def screened(fitter, candidate, *rest):
+            done.append(candidate.effect)
+            there = replace(base, candidates=(candidate,))
+            return replace(there, cost=(1.0 - share(there)) * base.cost)
+
+        def same(self, valve, *rest):
+            return valve
+
+        def refined(self, valve, *rest):
+            done.append(f'{valve.candidates[-1].effect} refined')
+            return valve
+
+        def found_base(fitter, group, valve, drive):
+            done.append('deepened')
+            return valve
+
+        def residuals(self, valve, *rest):
+            return noise + misfit * (1.0 - share(valve)) ** 0.5
+
+        monkeypatch.setattr(heats, 'screened', screened)
+        monkeypatch.setattr('valve_sim_ros.diagnosis.race.find_base', found_base)
+        for name, search in (('fit', same), ('evolve', same), ('refined', refined)):
+            monkeypatch.setattr(Fitter, name, search)
+        monkeypatch.setattr(Fitter, 'residuals', residuals)
+        left = leftover(residuals(fitter, base)).excess
+        race(fitter, STEM, base, [c for c in STEM.candidates() if c.effect in closes], **how)
+        return left, done
+
+    return run
+
+
+@pytest.mark.parametrize(('closed', 'deepened'), [(0.9999, False), (0.8, True)])
+def test_in_haste_one_that_takes_long_is_tried_before_another_is_deepened(closed, deepened, steps):
+    _, done = steps({LABORIOUS: closed, QUICK: 0.9}, deeply=True, hastily=True)
+    assert ('deepened' in done) == deepened
+    assert not deepened or done.index(LABORIOUS) < done.index('deepened')
+
+
+@pytest.mark.parametrize(('second', 'longer'), [(0.5, True), (0.1, False)])
+def test_one_that_costs_far_more_than_the_best_is_not_refined(second, longer, steps):
+    _, done = steps({'friction_asymmetry': 0.6, QUICK: second})
+    assert (f'{QUICK} refined' in done) == longer
+    assert 'friction_asymmetry refined' in done
+
+
+@pytest.mark.parametrize(('gap', 'tried'), [(0.5, True), (0.01, False)])
+def test_a_little_that_is_left_is_reason_enough_for_one_that_takes_long(gap, tried, steps):
+    left, done = steps({LABORIOUS: 0.5, 'spring_preload': 0.1}, gap)
+    assert left < odds.SPOTLESS
+    assert (left > FAINT) == tried == (LABORIOUS in done)
