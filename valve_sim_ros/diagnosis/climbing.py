@@ -149,7 +149,7 @@ def _quickly(
     again: Callable[..., Ladder],
     stops: tuple[type[BaseException], ...],
 ) -> Ladder:
-    """Return the ladder of a stem, searches that take long only if nothing else explains it.
+    """Return the ladder of a stem, races to their end only if nothing else explains it.
 
     One slip that comes at another moment spoils all that a free stem does until the next one: of
     two effects each looks as if it explained nothing. So before these it is looked at caught.

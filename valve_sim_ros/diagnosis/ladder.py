@@ -87,7 +87,7 @@ def climb(
         Excess that the signals before this one leave: if that is more than noise, no more than
         that says nothing.
     hastily : bool
-        Leave out effects whose search takes long, but beside one that explains most.
+        End races early, see `race`, but beside one that explains most.
     raced : sequence of Valve
         What a first race ended with when done hastily.
     most : int

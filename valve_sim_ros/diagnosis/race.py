@@ -33,8 +33,9 @@ def race(
 ) -> list[Valve]:
     """Return valves with one more effect, best first; the better, the more refitted.
 
-    `deeply` searches for the base valve anew beside the best, `hastily` leaves out effects whose
-    search takes long if no other one explains nearly all. `raced` is what that ended with before.
+    `deeply` searches for the base valve anew beside the best. `hastily` ends before effects whose
+    search takes long, behind a measured p2 before their laws with one more parameter, unless one
+    explains nearly all. `raced` is what that ended with before.
     After one of `stops` it is what was found until then, and no further search begins.
     """
     found, runners = [*raced], list[Valve]()
@@ -73,8 +74,8 @@ def _run(
         heats.runners = raced
     else:
         heats.waiting = raced
-    alone = len(group.stages) == 1 and PUT_TO_REST.isdisjoint(fitter.drive)
-    if hastily and alone and not raced and heats.ended:
+    stem_only = len(group.stages) == 1 and PUT_TO_REST.isdisjoint(fitter.drive)
+    if hastily and stem_only and not raced and heats.ended:
         # one whose search takes long may explain all: before others are deepened in vain
         _run_slow(heats, slow, plainly=True)
     ended = heats.ended
