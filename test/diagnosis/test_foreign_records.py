@@ -11,7 +11,7 @@ from valve_sim_ros import simulate
 from valve_sim_ros.diagnosis import diagnose
 from valve_sim_ros.diagnosis.adequacy import Leftover
 from valve_sim_ros.diagnosis.diagnose import _closes_nothing
-from valve_sim_ros.diagnosis.ladder import concluded, Ladder
+from valve_sim_ros.diagnosis.outcome import concluded, Ladder
 from valve_sim_ros.diagnosis.proof import Gap, Halves
 from valve_sim_ros.diagnosis.rung import Rung
 from valve_sim_ros.diagnosis.stages import groups

@@ -18,13 +18,9 @@ from valve_sim_ros.diagnosis.bench import Bench
 from valve_sim_ros.diagnosis.climbing import _let_go, _quickly
 from valve_sim_ros.diagnosis.coarse import COARSE, rounded
 from valve_sim_ros.diagnosis.fitting import by_cost, Fitter
-from valve_sim_ros.diagnosis.ladder import (
-    climb,
-    concluded,
-    excused,
-    Ladder,
-)
+from valve_sim_ros.diagnosis.ladder import climb
 from valve_sim_ros.diagnosis.odds import blurred, explained, imitates, strong, suspicious
+from valve_sim_ros.diagnosis.outcome import concluded, excused, Ladder
 from valve_sim_ros.diagnosis.race import race
 from valve_sim_ros.diagnosis.reconsidering import reconsidered
 from valve_sim_ros.diagnosis.rung import judged, Rung
@@ -158,17 +154,24 @@ def test_a_base_valve_that_is_rare_passes_for_an_effect(effect, odd):
     assert not imitates(there, 'dwell_friction')
 
 
-@pytest.mark.parametrize(('height', 'ends'), [(10.0, True), (9.0, False)])
-def test_a_bump_of_friction_as_high_as_can_be_stands_for_a_stop(height, ends):
+@pytest.mark.parametrize(('height', 'large'), [(3.7, True), (3.5, False)])
+def test_a_bump_of_friction_far_higher_than_usual_stands_for_a_stop(height, large):
     valve = starting_valve(Bench([measured()]))
     bump = next(c for c in STEM.candidates() if 'height' in c.names)
     values = {**valve.values, **bump.neutral, f'{bump.effect}.height': height}
     there = replace(valve, values=values, candidates=(bump,))
-    assert odds.at_limit(there, [bump.effect]) == ends
     ladder = ladder_of('adequate', left(60.0), left(0.1), bump.effect)
-    assert concluded(replace(ladder, valve=there)).outcome == (
-        'unknown_effect' if ends else 'missing_effect'
-    )
+    rungs = tuple(replace(rung, valve=there) for rung in ladder.rungs)
+    found = concluded(replace(ladder, valve=there, rungs=rungs))
+    assert found.outcome == ('unknown_effect' if large else 'missing_effect')
+    told = f'the least bad, {bump.effect}, would be far larger than usual'
+    assert found.nearest == (told if large else '')
+
+
+@pytest.mark.parametrize('signal', ['p1', 'p2', 'x'])
+def test_nearly_the_noise_once_more_is_unknown(signal):
+    assert odds.adequate(signal, left(0.75))
+    assert not odds.adequate(signal, left(0.87))
 
 
 def test_jitter_may_leave_more_of_p2():

@@ -21,6 +21,12 @@ def test_a_name_beside_an_unknown_effect_is_said_first():
     found = diagnose(Recording(s.t, u, *rows))
     assert 'With ip_dead_time added it does' in report(found)
     *others, last = found.ladders
-    page = report(replace(found, ladders=(*others, replace(last, outcome='unknown_effect'))))
+    guess = next(rung for ladder in found.ladders for rung in ladder.rungs)
+    unknown = replace(last, outcome='unknown_effect', best_guess=guess)
+    found = replace(found, ladders=(*others, unknown))
+    page = report(found)
     assert 'no effect of the catalogue explains it' in page
+    nearest = 'the least bad, ip_dead_time, leaves too much of the gap open'
+    assert f'In x, {nearest}.' in page
+    assert f'    {nearest}' in found.lines()
     assert 'In other stages it can be named: ip_dead_time' in page

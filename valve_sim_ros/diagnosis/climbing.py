@@ -13,8 +13,9 @@ from .adequacy import leftover
 from .base_valve import find_base, standing_still
 from .coarse import rounded
 from .fitting import by_cost, FINE, Fitter, GENERATIONS, NARROW, PATIENT, Valve
-from .ladder import climb, concluded, excused, Ladder, MOST_EFFECTS
+from .ladder import climb, MOST_EFFECTS
 from .loop import acts_back, closed_loop
+from .outcome import concluded, excused, Ladder
 from .rung import Rung
 from .stages import Candidate, Group
 from .stretch import CAUGHT, HELD, MODELLED, RESTS
@@ -109,7 +110,7 @@ def climb_all(
             fitter.phase = PHASE  # p1 shows a dead time to a sample only, what follows the rest
         if not added:
             base = ladder.base
-        inexact = group.signal == 'p1' and ladder.after.excess > odds.ADEQUATE['p1']
+        inexact = group.signal == 'p1' and ladder.after.excess > odds.ADEQUATE
         if ladder.outcome == 'unknown_effect' or inexact:
             # what is wrong here must not be blamed on the stages that follow; a stem that is
             # driven by a noisy p2 would slip at other moments
@@ -212,7 +213,7 @@ def _final(ladder: Ladder) -> bool:
 
 def _patiently(fitter: Fitter, ladder: Ladder, guess: Rung) -> Ladder:
     """Return the ladder with a name that explains most, if it explains x after a long search."""
-    if guess.closed < odds.LEAST_LED:
+    if guess.closed < odds.LEAST_LED or guess.too_large:
         return ladder
     *others, _ = guess.valve.candidates
     found = []
@@ -236,7 +237,7 @@ def _let_go(fitter: Fitter, ladder: Ladder, guess: Rung | None) -> Ladder | None
 
     A stem that is put to rest cannot swing: a vibration explains little of it.
     """
-    if guess is None or guess.closed < odds.LEAST_LED:
+    if guess is None or guess.closed < odds.LEAST_LED or guess.too_large:
         return None
     valve = _free(fitter, ladder.group, guess.valve)
     found = _named(fitter, ladder, replace(guess, valve=valve))

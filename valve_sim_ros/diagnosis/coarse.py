@@ -13,8 +13,8 @@ import math
 from . import odds
 from .adequacy import leftover
 from .fitting import Fitter
-from .ladder import concluded, Ladder
 from .odds import COARSE
+from .outcome import concluded, Ladder
 from .readings import OFF
 from .rung import Rung
 from .stages import Candidate

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from .fitting import Fitter, Valve
-from .ladder import Ladder
+from .outcome import Ladder
 
 EFFECT = 'ip_dead_time'
 TIME = f'{EFFECT}.dead_time'

@@ -21,8 +21,8 @@ from .conditions import Place, places
 from .errors import DiagnosisError
 from .fitting import Fitter, go_on, Valve
 from .intervals import intervals
-from .ladder import concluded, Ladder
 from .odds import COARSE
+from .outcome import concluded, Ladder
 from .proof import closed, Gap, prove
 from .result import Diagnosis, Named
 from .stages import Group, groups

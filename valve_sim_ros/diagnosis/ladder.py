@@ -3,8 +3,7 @@
 """The ladder: in one group of stages, one effect after the other until noise is left."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
-from typing import Literal
+from dataclasses import replace
 
 from ..model.effects import CATALOGUE
 from . import odds
@@ -13,6 +12,7 @@ from .arrivals import put_in_its_period
 from .base_valve import ahead_on_ramps, find_base, on_other_side, on_time, standing_still
 from .fitting import by_cost, Fitter, Valve
 from .loosening import loosened
+from .outcome import Ladder
 from .race import race, rebased
 from .reconsidering import reconsidered
 from .rung import judged, Rung
@@ -22,33 +22,6 @@ from .stretch import HELD, MODELLED, PUT_TO_REST
 
 MOST_EFFECTS = 2
 """Most effects named in one group of stages."""
-
-Outcome = Literal['adequate', 'missing_effect', 'unknown_effect']
-
-
-@dataclass(frozen=True)
-class Ladder:
-    """What was found in one group of stages."""
-
-    group: Group
-    outcome: Outcome
-    base: Valve
-    valve: Valve
-    before: Leftover
-    after: Leftover
-    rungs: tuple[Rung, ...] = ()
-    best_guess: Rung | None = None
-    complete: bool = True
-    """Whether all that could be missing was tried; not so if the diagnosis was stopped."""
-    blurred: float = 0.0
-    """Excess that comes of the noise of a measured x."""
-    raced: tuple[Valve, ...] = ()
-    """How its first race ended."""
-
-    @property
-    def told(self) -> str:
-        """The outcome in words."""
-        return self.outcome.replace('_', ' ') + ('' if self.complete else ', not all was tried')
 
 
 def climb(
@@ -316,35 +289,3 @@ def _imitated(effect: str, base: Valve) -> bool:
 def _within(progress: Callable[[float], object], step: int) -> Callable[[float], object]:
     """Return how to tell the progress of one step of the ladder."""
     return lambda share: progress((step + share) / MOST_EFFECTS)
-
-
-def concluded(ladder: Ladder) -> Ladder:
-    """Return the ladder with its outcome: names only if together they explain the gap.
-
-    None of them may be as large as it can be.
-    """
-    names = [rung.effect for rung in ladder.rungs]
-    signal = ladder.group.signal
-    # next to nothing is left to close where the base valve imitates it
-    hidden = all(odds.imitates(ladder.base, name) for name in names)
-    spotless = hidden and ladder.after.excess <= odds.SPOTLESS
-    explained = odds.explained(signal, ladder.before, ladder.after, names, ladder.blurred)
-    if names and (spotless or explained) and not odds.at_limit(ladder.valve, names):
-        return replace(ladder, outcome='missing_effect')
-    # what does not explain the gap is not left in the valve either
-    outcome: Outcome = 'adequate' if odds.adequate(signal, ladder.before) else 'unknown_effect'
-    return replace(ladder, outcome=outcome, valve=ladder.base, after=ladder.before, rungs=())
-
-
-def excused(ladder: Ladder, plain: Leftover, carried: float, *, sure: bool = False) -> Ladder:
-    """Return the ladder of a group behind one with an effect, not unknown if that explains most.
-
-    Its law is never quite right, and slips tell; nor is it unknown if no more is left than the
-    `carried` excess of the signals before. `plain` is what the valve without it leaves. It is
-    `sure` if it closes nearly all of a gap before, though more than noise is carried on.
-    """
-    explained = (carried <= odds.CLEAN or sure) and plain.closed_by(ladder.before) >= odds.MOSTLY
-    carried_on = carried > odds.CLEAN and ladder.before.excess <= carried
-    if ladder.outcome == 'unknown_effect' and (explained or carried_on):
-        return replace(ladder, outcome='adequate')
-    return ladder

@@ -20,7 +20,7 @@ from .bench import Bench
 from .conditions import Place
 from .decision import decisions, TestSignal
 from .fitting import Valve
-from .ladder import Ladder, Outcome
+from .outcome import Ladder, Outcome
 from .proof import Gap
 from .rung import Rung
 
@@ -163,6 +163,8 @@ class Diagnosis:
                 f'{ladder.told}; excess over the noise '
                 f'{ladder.before.excess:.3g}, then {ladder.after.excess:.3g}'
             )
+            if ladder.nearest:
+                found.append(f'    {ladder.nearest}')
         for named in self.effects:
             found += self._effect_lines(named)
         for place in self.places:

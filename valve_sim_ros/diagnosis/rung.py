@@ -44,6 +44,11 @@ class Rung:
     valve: Valve
 
     @property
+    def too_large(self) -> bool:
+        """Whether it is far larger than it usually is."""
+        return odds.too_large(self.valve, self.effect)
+
+    @property
     def runner_up(self) -> str | None:
         """The effect that comes next."""
         others = {n: g for n, g in self.gains.items() if n != self.effect and g > 0.0}

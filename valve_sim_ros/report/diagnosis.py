@@ -5,7 +5,7 @@
 import os
 
 from ..diagnosis.decision import decisions
-from ..diagnosis.ladder import Ladder
+from ..diagnosis.outcome import Ladder
 from ..diagnosis.proof import Gap
 from ..diagnosis.result import Diagnosis, Named, PARTIAL
 from ..model.effects import CATALOGUE
@@ -50,7 +50,6 @@ def report(result: Diagnosis) -> str:
         overlay=embed(plots.before_and_after(result)),
         residuals=embed(plots.residuals(result)),
         condition=embed(plots.against_condition(result)) if result.places else None,
-        guesses=[ladder.best_guess.effect for ladder in result.unknown if ladder.best_guess],
         quality=[line for recording in result.recordings for line in recording.quality.lines()],
     )
 
