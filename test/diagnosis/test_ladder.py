@@ -15,7 +15,7 @@ from valve_sim_ros.diagnosis import ladder as climbing_up
 from valve_sim_ros.diagnosis.adequacy import Leftover, leftover
 from valve_sim_ros.diagnosis.base_valve import find_base, starting_valve
 from valve_sim_ros.diagnosis.bench import Bench
-from valve_sim_ros.diagnosis.climbing import _let_go, _quickly
+from valve_sim_ros.diagnosis.climbing import _final, _let_go, _quickly
 from valve_sim_ros.diagnosis.coarse import COARSE, rounded
 from valve_sim_ros.diagnosis.fitting import by_cost, Fitter
 from valve_sim_ros.diagnosis.ladder import climb
@@ -172,6 +172,14 @@ def test_a_bump_of_friction_far_higher_than_usual_stands_for_a_stop(height, larg
 def test_nearly_the_noise_once_more_is_unknown(signal):
     assert odds.adequate(signal, left(0.75))
     assert not odds.adequate(signal, left(0.87))
+
+
+def test_a_coarse_sensor_may_leave_steps_that_come_at_another_moment():
+    assert explained('x', left(3.04), left(0.28), [COARSE])
+    assert not explained('x', left(3.04), left(0.28), ['linkage_backlash'])
+    assert not explained('x', left(3.04), left(0.28), [COARSE, 'linkage_backlash'])
+    assert _final(ladder_of('missing_effect', left(3.04), left(0.28), COARSE))
+    assert not _final(ladder_of('missing_effect', left(3.04), left(0.28), 'linkage_backlash'))
 
 
 def test_jitter_may_leave_more_of_p2():

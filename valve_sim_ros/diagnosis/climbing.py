@@ -207,8 +207,10 @@ def _free(fitter: Fitter, group: Group, valve: Valve) -> Valve:
 
 def _final(ladder: Ladder) -> bool:
     """Tell whether names found in haste may stay: one that leaves more than noise may be wrong."""
-    enough = len(ladder.rungs) > 1 or odds.nearly_all(ladder.before, ladder.after)
-    return ladder.outcome == 'missing_effect' and enough
+    names = [rung.effect for rung in ladder.rungs]
+    enough = len(names) > 1 or odds.nearly_all(ladder.before, ladder.after)
+    # a stem that is next to the edge of a step always leaves more
+    return ladder.outcome == 'missing_effect' and (enough or names == [odds.COARSE])
 
 
 def _patiently(fitter: Fitter, ladder: Ladder, guess: Rung) -> Ladder:

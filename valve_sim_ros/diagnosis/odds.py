@@ -73,6 +73,8 @@ CLEAN = 0.25
 EXPLAINED, LEAST_CLOSED = {'p1': 0.95, 'p2': 0.9, 'x': 0.95}, 0.5
 """Least part of the excess that a name must close, else the effect is unknown (jitter leaves more
 of a p2 that moves fast); and where nothing but noise is left."""
+EXPLAINED_BY_STEPS = 0.9
+"""The same for a coarse sensor: a stem that is a hundredth off may be a whole step off."""
 EXPLAINED_BY_TWO, EXPLAINED_BUT_FAR, EXPLAINED_LASTING = 0.97, 0.99, 0.985
 """The same where two effects close it: two that are wrong imitate more than one; where what is
 left is far more than noise; and where a large gap is closed by one that shifts a signal for long:
@@ -255,6 +257,7 @@ def explained(
         least = LEAST_CLOSED
     else:
         least = EXPLAINED[signal] if len(names) == 1 else EXPLAINED_BY_TWO
+        least = EXPLAINED_BY_STEPS if {*names} == {COARSE} else least
     return before.closed_by(after) >= least
 
 
