@@ -15,7 +15,7 @@ from .coarse import rounded
 from .fitting import by_cost, FINE, Fitter, GENERATIONS, NARROW, PATIENT, Valve
 from .ladder import climb, MOST_EFFECTS
 from .loop import acts_back, closed_loop
-from .outcome import concluded, excused, Ladder
+from .outcome import but_seats, concluded, excused, Ladder
 from .rung import Rung
 from .stages import Candidate, Group
 from .stretch import CAUGHT, HELD, MODELLED, RESTS
@@ -116,7 +116,7 @@ def climb_all(
             # driven by a noisy p2 would slip at other moments
             fitter.drive = (*fitter.drive, group.signal)
     fitter.drive = ()
-    return ladders, base
+    return but_seats(ladders), base
 
 
 def _second_look(fitter: Fitter, ladder: Ladder, again: Callable[[], Ladder]) -> Ladder:

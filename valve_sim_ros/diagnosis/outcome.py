@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What was found in one group of stages, and its outcome: named, unknown, or nothing missing."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -76,6 +77,24 @@ def concluded(ladder: Ladder) -> Ladder:
         rungs=(),
         best_guess=guess,
     )
+
+
+def but_seats(ladders: Sequence[Ladder]) -> list[Ladder]:
+    """Return the ladders in which the ends of the stroke are no name beside another effect.
+
+    The valve keeps them: what presses a stem beyond 0 or 100 % presses it into its seat.
+    """
+    named = [rung.effect for ladder in ladders for rung in ladder.rungs]
+    if not named or {*named} == {odds.STOPS} or not odds.only_seats(ladders[-1].valve):
+        return [*ladders]
+    kept = [
+        replace(each, rungs=tuple(rung for rung in each.rungs if rung.effect != odds.STOPS))
+        for each in ladders
+    ]
+    return [
+        replace(each, outcome='adequate') if before.rungs and not each.rungs else each
+        for before, each in zip(ladders, kept, strict=True)
+    ]
 
 
 def excused(ladder: Ladder, plain: Leftover, carried: float, *, sure: bool = False) -> Ladder:
