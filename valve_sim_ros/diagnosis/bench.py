@@ -37,6 +37,7 @@ from .readings import (
     travelled,
     wild,
 )
+from .seats import seated, seats_of
 from .stretch import CAUGHT, FINELY, Grid, HELD, MODELLED, ON_TIME, RESTS, SOON, Stretch
 
 LEAST_PART = 20
@@ -193,6 +194,7 @@ class Bench:
     ) -> tuple[Array, Grid, float]:
         """Run one stretch; return outputs on its grid, the grid, and the score of a signal."""
         grid = self._grid(index, values, drive)
+        values, effects = seated(values, effects, self.seats)
         if MODELLED in drive:
             effects = [effect for effect in effects if effect not in self.before]
         composition = compose(effects, values)
@@ -318,6 +320,11 @@ class Bench:
         """Steps and offsets of grids to which x keeps, the coarsest first [%]; mostly none."""
         return grids_kept(self._all_x(), self.noise.get('x', 0.0))
 
+    @cached_property
+    def seats(self) -> dict[str, float]:
+        """The stops at the ends of the stroke against which x was pressed, none if it was not."""
+        return seats_of(self._all_x(), self.noise.get('x', 0.0))
+
     def _all_x(self) -> Array:
         """Return all measured x, none if x is not measured."""
         x = [s.measured['x'] for s in self.stretches if 'x' in self.signals]
@@ -332,12 +339,6 @@ class Bench:
     def _steps(self, result: Array) -> Array:
         """Return how far p1 moves up to each sample of a result [%], shape (n,)."""
         return np.abs(np.diff(result[0], prepend=result[0, :1]))
-
-    @property
-    def range_of_u(self) -> tuple[float, float]:
-        """Lowest and highest command [% of span]."""
-        u = np.concatenate([stretch.u for stretch in self.stretches])
-        return float(u.min()), float(u.max())
 
 
 THETA = tuple(parameter.name for parameter in BASE)

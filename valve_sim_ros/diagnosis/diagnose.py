@@ -25,6 +25,7 @@ from .odds import COARSE
 from .outcome import concluded, Ladder
 from .proof import closed, Gap, prove
 from .result import Diagnosis, Named
+from .seats import seated
 from .stages import Group, groups
 from .stretch import CAUGHT
 from .unknowns import complete
@@ -128,8 +129,8 @@ def diagnose(
         effects=_named(fitter, ladders, late),
         places=_places(fitter, ladders),
         gaps=gaps,
-        base=_spec(base),
-        augmented=_spec(augmented),
+        base=_spec(bench, base),
+        augmented=_spec(bench, augmented),
         base_valve=base,
         augmented_valve=augmented,
         seed=seed,
@@ -195,7 +196,8 @@ def _refuse_useless(bench: Bench) -> None:
             f'{bench.size} samples in stretches without gaps: expected at least {LEAST_SAMPLES}; '
             'record the valve for some minutes while the command moves'
         )
-    low, high = bench.range_of_u
+    low = min(stretch.u.min() for stretch in bench.stretches)
+    high = max(stretch.u.max() for stretch in bench.stretches)
     if high - low < 1.0:
         raise DiagnosisError(
             f'u stays between {low:.4g} and {high:.4g} %: nothing moves, nothing can be told; '
@@ -280,10 +282,10 @@ def _places(fitter: Fitter, ladders: Sequence[Ladder]) -> tuple[Place, ...]:
     return tuple(found)
 
 
-def _spec(valve: Valve) -> ValveSpec:
+def _spec(bench: Bench, valve: Valve) -> ValveSpec:
     """Return a fitted valve as the plant loads it."""
-    values = complete(valve.values)
-    spec = ValveSpec(effects=valve.effects)
+    values, effects = seated(complete(valve.values), valve.effects, bench.seats)
+    spec = ValveSpec(effects=tuple(effects))
     kept = {}
     for parameter in spec.parameters:
         if parameter.name in values:

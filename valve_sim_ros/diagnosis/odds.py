@@ -42,9 +42,6 @@ LOOP, BLURRED = 'positioner_loop', 0.7
 that is left then: hardly any where it rests, nearly all where it moves."""
 COARSE = 'sensor_quantisation'
 """The effect that the values of x show."""
-STOPS, SEAT = 'travel_stops', 1.0
-"""The effect that ends the stroke, and how near to 0 and 100 % [%] it is but the seat, or the stop
-at the other end, which every valve has."""
 LASTING = (
     'ip_calibration',
     'ip_nonlinearity',
@@ -184,17 +181,6 @@ def too_large(valve: Valve, effect: str) -> bool:
         abs(valve.values[f'{effect}.{each.name}'] - each.neutral) > TOO_LARGE * each.usual[1]
         for each in parameters
         if each.usual
-    )
-
-
-def only_seats(valve: Valve) -> bool:
-    """Tell whether the stops of a valve are no others than the ends of its stroke."""
-    ends = {'lower': 0.0, 'upper': 100.0}
-    names = {name for each in valve.candidates if each.effect == STOPS for name in each.names}
-    return all(
-        abs(valve.values[f'{STOPS}.{name}'] - end) <= SEAT
-        for name, end in ends.items()
-        if name in names
     )
 
 

@@ -10,6 +10,7 @@ from . import odds
 from .adequacy import Leftover
 from .fitting import Valve
 from .rung import Rung
+from .seats import only_seats, STOPS
 from .stages import Group
 
 Outcome = Literal['adequate', 'missing_effect', 'unknown_effect']
@@ -85,10 +86,12 @@ def but_seats(ladders: Sequence[Ladder]) -> list[Ladder]:
     The valve keeps them: what presses a stem beyond 0 or 100 % presses it into its seat.
     """
     named = [rung.effect for ladder in ladders for rung in ladder.rungs]
-    if not named or {*named} == {odds.STOPS} or not odds.only_seats(ladders[-1].valve):
+    valve = ladders[-1].valve
+    fitted = [name for c in valve.candidates if c.effect == STOPS for name in c.names]
+    if not named or {*named} == {STOPS} or not only_seats(valve.values, fitted):
         return [*ladders]
     kept = [
-        replace(each, rungs=tuple(rung for rung in each.rungs if rung.effect != odds.STOPS))
+        replace(each, rungs=tuple(rung for rung in each.rungs if rung.effect != STOPS))
         for each in ladders
     ]
     return [
