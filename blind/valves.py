@@ -18,7 +18,10 @@ def either_sign(rng: np.random.Generator, low: float, high: float) -> float:
 
 
 def base_valve(rng: np.random.Generator) -> Physics:
-    """Return a random valve; nine of ten stems do not overshoot, three stop before the others."""
+    """Return a random valve; nine of ten stems do not overshoot, three stop before the others.
+
+    One of two has its seat at 0 % and a stop at 100 %, which effects may press the stem against.
+    """
     friction = rng.uniform(2.0, 12.0)
     slow = rng.random() < 0.12
     while True:
@@ -35,4 +38,5 @@ def base_valve(rng: np.random.Generator) -> Physics:
         a_1=stiffness,
         a_2=stiffness / rate,
         delta=log_uniform(rng, 1e-4, 0.1) if rng.random() < 0.3 else 1e-5,
+        **({'stop_low': 0.0, 'stop_high': 100.0} if rng.random() < 0.5 else {}),
     )
