@@ -8,6 +8,7 @@ import numpy as np
 
 from valve_sim_ros import simulate
 from valve_sim_ros.diagnosis import diagnose
+from valve_sim_ros.model.spec import ValveSpec
 from valve_sim_ros.recordings.recording import Recording
 from valve_sim_ros.report.diagnosis import report
 
@@ -20,6 +21,12 @@ def test_a_name_beside_an_unknown_effect_is_said_first():
     rows = np.array([s.p1, s.p2, s.x]) + noise
     found = diagnose(Recording(s.t, u, *rows))
     assert 'With ip_dead_time added it does' in report(found)
+    assert 'end of its stroke' not in report(found)
+    pressed = ValveSpec(effects=('ip_dead_time', 'travel_stops'))
+    pressed = replace(found, augmented=pressed.changed({'travel_stops.lower': 0.0}))
+    told = 'the stem is pressed against the end of its stroke at 0 %: '
+    assert f'Besides, {told}' in report(pressed)
+    assert any(line.startswith(told) for line in pressed.lines())
     *others, last = found.ladders
     guess = next(rung for ladder in found.ladders for rung in ladder.rungs)
     unknown = replace(last, outcome='unknown_effect', best_guess=guess)

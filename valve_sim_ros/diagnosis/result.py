@@ -23,6 +23,7 @@ from .fitting import Valve
 from .outcome import Ladder, Outcome
 from .proof import Gap
 from .rung import Rung
+from .seats import ends_of
 
 SCHEMA_VERSION = 1
 WORDS = {
@@ -100,6 +101,14 @@ class Diagnosis:
         return tuple(ladder for ladder in self.ladders if ladder.outcome == 'unknown_effect')
 
     @property
+    def ends(self) -> str:
+        """The ends of the stroke that hold the stem though nothing is named there, in words."""
+        effects = {*self.augmented.effects} - {each.rung.effect for each in self.effects}
+        ends = ends_of(self.augmented.values, effects)
+        where = ' and '.join(f'{end:g} %' for end in ends)
+        return f'the stem is pressed against the end of its stroke at {where}' if ends else ''
+
+    @property
     def test_signal(self) -> TestSignal:
         """The commands that would decide what these data cannot."""
         return TestSignal.of(self.recordings[0])
@@ -167,6 +176,8 @@ class Diagnosis:
                 found.append(f'    {ladder.nearest}')
         for named in self.effects:
             found += self._effect_lines(named)
+        if self.ends:
+            found.append(f'{self.ends}: no effect, but augmented.yaml has it too (travel_stops)')
         for place in self.places:
             found.append(
                 f'where: {place.signal} is off {place.condition} '

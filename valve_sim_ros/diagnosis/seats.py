@@ -6,7 +6,7 @@ The base valve never gets there, for friction holds it back. What an effect pres
 ends hold: they are part of the valve then, and no effect.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 
 import numpy as np
 
@@ -62,6 +62,13 @@ def seated(
     if not (seats and effects) or STOPS in effects:
         return values, effects
     return {**values, **seats}, (*effects, STOPS)
+
+
+def ends_of(values: Mapping[str, float], effects: Collection[str]) -> list[float]:
+    """Return the ends of the stroke at which a valve with these effects stops [% of span]."""
+    if STOPS not in effects:
+        return []
+    return [end for name, end in ENDS.items() if abs(values[f'{STOPS}.{name}'] - end) <= SEAT]
 
 
 def only_seats(values: Mapping[str, float], names: Sequence[str]) -> bool:
