@@ -255,9 +255,10 @@ def explained(
         least = EXPLAINED_LASTING
     elif after.excess <= CLEAN:
         least = LEAST_CLOSED
+    elif {*names} == {COARSE}:
+        least = EXPLAINED_BY_STEPS
     else:
         least = EXPLAINED[signal] if len(names) == 1 else EXPLAINED_BY_TWO
-        least = EXPLAINED_BY_STEPS if {*names} == {COARSE} else least
     return before.closed_by(after) >= least
 
 

@@ -10,7 +10,7 @@ from . import odds
 from .adequacy import Leftover
 from .fitting import Valve
 from .rung import Rung
-from .seats import only_seats, STOPS
+from .seats import ENDS, ends_of, STOPS
 from .stages import Group
 
 Outcome = Literal['adequate', 'missing_effect', 'unknown_effect']
@@ -85,19 +85,17 @@ def but_seats(ladders: Sequence[Ladder]) -> list[Ladder]:
 
     The valve keeps them: what presses a stem beyond 0 or 100 % presses it into its seat.
     """
-    named = [rung.effect for ladder in ladders for rung in ladder.rungs]
+    named = {rung.effect for ladder in ladders for rung in ladder.rungs}
     valve = ladders[-1].valve
-    fitted = [name for c in valve.candidates if c.effect == STOPS for name in c.names]
-    if not named or {*named} == {STOPS} or not only_seats(valve.values, fitted):
+    stops = [n for c in valve.candidates if c.effect == STOPS for n in c.names if n in ENDS]
+    if named <= {STOPS} or len(ends_of(valve.values, stops)) < len(stops):
         return [*ladders]
-    kept = [
-        replace(each, rungs=tuple(rung for rung in each.rungs if rung.effect != STOPS))
-        for each in ladders
-    ]
-    return [
-        replace(each, outcome='adequate') if before.rungs and not each.rungs else each
-        for before, each in zip(ladders, kept, strict=True)
-    ]
+    found = []
+    for each in ladders:
+        rungs = tuple(rung for rung in each.rungs if rung.effect != STOPS)
+        gone = each.rungs and not rungs
+        found.append(replace(each, rungs=rungs, outcome='adequate' if gone else each.outcome))
+    return found
 
 
 def excused(ladder: Ladder, plain: Leftover, carried: float, *, sure: bool = False) -> Ladder:

@@ -23,7 +23,7 @@ from .fitting import Valve
 from .outcome import Ladder, Outcome
 from .proof import Gap
 from .rung import Rung
-from .seats import ends_of
+from .seats import ends_of, STOPS
 
 SCHEMA_VERSION = 1
 WORDS = {
@@ -103,8 +103,8 @@ class Diagnosis:
     @property
     def ends(self) -> str:
         """The ends of the stroke that hold the stem though nothing is named there, in words."""
-        effects = {*self.augmented.effects} - {each.rung.effect for each in self.effects}
-        ends = ends_of(self.augmented.values, effects)
+        besides = {*self.augmented.effects} - {each.rung.effect for each in self.effects}
+        ends = ends_of(self.augmented.values) if STOPS in besides else []
         where = ' and '.join(f'{end:g} %' for end in ends)
         return f'the stem is pressed against the end of its stroke at {where}' if ends else ''
 

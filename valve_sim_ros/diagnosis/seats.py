@@ -6,7 +6,7 @@ The base valve never gets there, for friction holds it back. What an effect pres
 ends hold: they are part of the valve then, and no effect.
 """
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 
@@ -64,15 +64,6 @@ def seated(
     return {**values, **seats}, (*effects, STOPS)
 
 
-def ends_of(values: Mapping[str, float], effects: Collection[str]) -> list[float]:
-    """Return the ends of the stroke at which a valve with these effects stops [% of span]."""
-    if STOPS not in effects:
-        return []
-    return [end for name, end in ENDS.items() if abs(values[f'{STOPS}.{name}'] - end) <= SEAT]
-
-
-def only_seats(values: Mapping[str, float], names: Sequence[str]) -> bool:
-    """Tell whether stops, fitted by these parameters, are but the ends of the stroke."""
-    return all(
-        abs(values[f'{STOPS}.{name}'] - ENDS[name]) <= SEAT for name in names if name in ENDS
-    )
+def ends_of(values: Mapping[str, float], names: Iterable[str] = tuple(ENDS)) -> list[float]:
+    """Return the ends of the stroke that stops with these parameters are [% of span]."""
+    return [ENDS[name] for name in names if abs(values[f'{STOPS}.{name}'] - ENDS[name]) <= SEAT]
