@@ -121,6 +121,21 @@ def test_a_stem_that_is_let_go_at_a_constant_pressure_is_forgiven_nothing():
     assert np.nanmedian(np.abs(residual[200:])) > 50.0
 
 
+def test_a_stem_that_one_slip_could_let_go_at_any_time_is_not_forgiven_all():
+    time = 0.2 * np.arange(3000)
+    x = np.where(time % 60.0 < 30.0, 36.0, 38.0)
+    x += 0.2 * np.random.default_rng(4).standard_normal(x.size)
+    bench = Bench([Recording(time, np.full(x.size, 5.0), x=x)])
+    brink = {'f_s': 34.0, 'f_d': 30.0, 'T_g1': 20.0, 'T_g2': 20.0}
+    at_once, late = (
+        bench.run(complete({**VALUES, **brink, 'p1_0': 5.2, 'p2_0': 5.2, 'x_0': 39.0 + above}))
+        for above in (0.19, 0.01)
+    )
+    assert np.all(at_once[0][3] == at_once[0][2])
+    assert np.ptp(late[0][2]) > 3.0
+    assert np.all(late[0][3] == late[0][2])  # p2 is where it slips for 90 % of the record
+
+
 @pytest.mark.parametrize('drive', [(), ('p1', 'p2')])
 def test_a_stem_that_is_nearly_free_is_forgiven_nothing(drive):
     bench = Bench([recording(0.1)])

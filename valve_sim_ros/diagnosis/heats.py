@@ -85,10 +85,10 @@ class Heats:
         """Tell whether it closes so much of the gap that effects that take long are not tried."""
         return odds.nearly_all(self.before, self.left_by(runner))
 
-    def most(self, runners: Sequence[Valve]) -> bool:
+    def most(self, runners: Sequence[Valve], part: float = odds.MOSTLY) -> bool:
         """Tell whether the best of these closes most of the gap."""
         best = min(runners, key=by_cost, default=self.valve)
-        return self.before.closed_by(self.left_by(best)) >= odds.MOSTLY
+        return self.before.closed_by(self.left_by(best)) >= part
 
     def promising(self, runners: Sequence[Valve]) -> bool:
         """Tell whether the best of these closes enough of the gap to be followed."""

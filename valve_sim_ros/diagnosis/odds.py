@@ -21,7 +21,8 @@ NO_DROP, SLUGGISH = 0.93, 1.1
 how near to the slowest a stem is odd."""
 MORE_SHARE, FAR_OFF = 0.02, 2.0
 """Least part of the whole gap that it closes, unless it leaves nothing but noise; the excess that
-is far more than noise: it may close less of that, if both together explain the gap."""
+is far more than noise: it may close less of that, if both together explain the gap, and what is
+left may count as noise more easily."""
 ALIKE_SHARE = 0.05
 """Least part of the whole gap where it is declared to look like one named before."""
 COLOURED, COLOUR, WHITER = 1.5, 2.0, 0.6
@@ -87,6 +88,8 @@ do not look like it are not tried."""
 TOO_LARGE = 1.2
 """An effect of more than this times its largest usual size stands for another. Of 154 right names
 none had more than 0.97 times that, of 19 wrong ones six had 1.08 to 3.3 times."""
+NEXT_TO_IT = 0.95
+"""Part of the gain of such a one that makes the best of a usual size the one it stands for."""
 LEAST_FIRST, LEAST_AGAIN = 0.1, 0.35
 """A first effect that closes less than this part of the excess is not followed by a second; nor in
 a second look, where slips do not hide what is missing, and where what the base valve leaves counts
@@ -138,8 +141,16 @@ def gain(before: float, after: Valve, left: Leftover) -> float:
 
 
 def choice(runners: Sequence[Valve], gains: Mapping[str, float]) -> Valve:
-    """Return the best runner; of those the data do not tell apart, the most plausible."""
+    """Return the best runner; of those the data do not tell apart, the most plausible.
+
+    One that is far larger than usual stands for another, which may be next to it.
+    """
+    likely = [each for each in runners if not too_large(each, each.candidates[-1].effect)]
     best = max(gains.values())
+    if likely:
+        best_likely = max(gains[each.candidates[-1].effect] for each in likely)
+        if best_likely >= NEXT_TO_IT * best:
+            runners, best = likely, best_likely
     limit = twin_limit(best)
     close = [each for each in runners if best - gains[each.candidates[-1].effect] < limit]
     return min(close, key=lambda each: (surprise(each), -gains[each.candidates[-1].effect]))
@@ -233,7 +244,8 @@ def needed(
     if any(look_alike(last, other) for other in others):
         spotless = before.excess > FAR_OFF and after.excess <= SPOTLESS
         return (share >= ALIKE_SHARE or spotless) and (closed >= MORE_CLOSED or explained)
-    matters = share >= MORE_SHARE or after.excess <= SPOTLESS
+    spotless = after.excess <= (CLEAN if before.excess > FAR_OFF else SPOTLESS)
+    matters = share >= MORE_SHARE or spotless
     return matters and (closed >= MORE_CLOSED or explained)
 
 

@@ -75,10 +75,11 @@ def _run(
     else:
         heats.waiting = raced
     stem_only = len(group.stages) == 1 and PUT_TO_REST.isdisjoint(fitter.drive)
-    if hastily and stem_only and not raced and heats.ended:
+    ended = heats.ended
+    if hastily and stem_only and ended and not (raced or heats.most(ended, odds.EXPLAINED['x'])):
         # one whose search takes long may explain all: before others are deepened in vain
         _run_slow(heats, slow, plainly=True)
-    ended = heats.ended
+        ended = heats.ended
     hasty = hastily and ended and not heats.nearly_all(ended[0])
     mostly = heats.most(ended)
     # in haste what explains most was deepened already
