@@ -113,6 +113,20 @@ def test_of_two_effects_that_fit_alike_the_one_in_its_usual_stage_is_named():
     assert odds.choice(runners, {**gains, 'hysteresis': 700.0}) is runners[0]
 
 
+def test_one_far_larger_than_usual_stands_for_one_next_to_it():
+    each = {c.effect: c for c in groups(('p1', 'p2', 'x'))[2].candidates()}
+    spans = {'sensor_calibration.zero': 0.0, 'sensor_calibration.span': 0.7}
+    runners = [
+        Valve({**each[name].neutral, **spans, 'spring_rate.factor': 1.3}, candidates=(each[name],))
+        for name in ('sensor_calibration', 'spring_rate')
+    ]
+    gains = {'sensor_calibration': 770e3, 'spring_rate': 764e3}
+    assert odds.choice(runners, gains) is runners[1]
+    assert odds.choice(runners, {**gains, 'spring_rate': 700e3}) is runners[0]
+    runners[0].values['sensor_calibration.span'] = 0.9
+    assert odds.choice(runners, gains) is runners[0]
+
+
 def test_errors_of_any_size_can_be_compared():
     rng = np.random.default_rng(2)
     noise, misfit = rng.standard_normal(5000), np.linspace(-400.0, 400.0, 5000)
@@ -128,6 +142,10 @@ def test_a_further_effect_must_close_part_of_the_whole_gap():
     assert odds.needed(base, far, 0.3, near, names)  # much is left, and both explain it
     assert not odds.needed(base, near, 0.3, clean, names)  # enough is explained without it
     assert not odds.needed(base, near, 0.9, Leftover(1.5, 1.5, 1.0, 5000, 1.0), names)
+    # little of a huge gap, and yet far more than noise
+    quiet = Leftover(1.2, 1.2, 1.0, 5000, 1.0)
+    assert odds.needed(Leftover(701.0, 701.0, 1.0, 5000, 1.0), far, 0.98, quiet, names)
+    assert not odds.needed(base, near, 0.8, quiet, names)
     small, noise = (Leftover(1.0 + e, 1.0 + e, 1.0, 5000, 1.0) for e in (0.4, 0.05))
     # little of the whole, but nothing more is left; not if the first law may just not be right
     assert odds.needed(base, small, 0.9, noise, names)

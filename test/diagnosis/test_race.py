@@ -25,17 +25,17 @@ LABORIOUS, QUICK = 'stribeck_friction', 'fluid_force'
 def steps(monkeypatch):
     """Return what names the steps of a race in which each effect closes a share of the gap."""
 
-    def run(closes, gap=50.0, **how):
+    def run(closes, gap=50.0, beside=(), **how):
         u = np.repeat(np.random.default_rng(5).uniform(10.0, 90.0, 40), 50)
         s = simulate(u)
         fitter = Fitter(Bench([Recording(s.t, u, s.p1, s.p2, s.x)]))
-        base = replace(starting_valve(fitter.bench), cost=1e5)
+        base = replace(starting_valve(fitter.bench), cost=1e5, candidates=beside)
         noise = np.random.default_rng(0).standard_normal(u.size)
         misfit = gap**0.5 * np.sin(0.01 * np.arange(u.size)) * (np.arange(u.size) % 400 > 150)
         done = []
 
         def share(valve):
-            return closes[valve.candidates[-1].effect] if valve.candidates else 0.0
+            return closes[valve.candidates[-1].effect] if valve.candidates != beside else 0.0
 
         def screened(fitter, candidate, *rest):
             done.append(candidate.effect)
@@ -73,6 +73,18 @@ def test_in_haste_one_that_takes_long_is_tried_before_another_is_deepened(closed
     _, done = steps({LABORIOUS: closed, QUICK: 0.9}, deeply=True, hastily=True)
     assert ('deepened' in done) == deepened
     assert not deepened or done.index(LABORIOUS) < done.index('deepened')
+
+
+@pytest.mark.parametrize(
+    ('closed', 'beside', 'tried'),
+    [(0.97, '', False), (0.9, '', True), (0.9, QUICK, False), (0.5, QUICK, True)],
+)
+def test_in_haste_one_that_takes_long_waits_if_others_explain_enough(closed, beside, tried, steps):
+    named = tuple(each for each in STEM.candidates() if each.effect == beside)[:1]
+    _, done = steps(
+        {LABORIOUS: 0.99, 'friction_asymmetry': closed}, beside=named, hastily=True, deeply=True
+    )
+    assert (LABORIOUS in done) == tried
 
 
 @pytest.mark.parametrize(('second', 'longer'), [(0.5, True), (0.1, False)])

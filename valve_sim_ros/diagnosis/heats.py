@@ -86,7 +86,7 @@ class Heats:
         return odds.nearly_all(self.before, self.left_by(runner))
 
     def most(self, runners: Sequence[Valve], part: float = odds.MOSTLY) -> bool:
-        """Tell whether the best of these closes most of the gap."""
+        """Tell whether the best of these closes most of the gap, or a given part of it."""
         best = min(runners, key=by_cost, default=self.valve)
         return self.before.closed_by(self.left_by(best)) >= part
 

@@ -60,7 +60,7 @@ def climb(
         Excess that the signals before this one leave: if that is more than noise, no more than
         that says nothing.
     hastily : bool
-        End races early, see `race`, but beside one that explains most.
+        End races early, see `race`.
     raced : sequence of Valve
         What a first race ended with when done hastily.
     most : int
@@ -154,7 +154,7 @@ def climb(
                 some,
                 _within(progress, step),
                 deeply=deeply,
-                hastily=hastily and not rungs,
+                hastily=hastily,
                 raced=raced if some is candidates and not rungs else (),
                 stops=stops,
             )

@@ -35,7 +35,8 @@ def race(
 
     `deeply` searches for the base valve anew beside the best. `hastily` ends before effects whose
     search takes long, behind a measured p2 before their laws with one more parameter, unless one
-    explains nearly all. `raced` is what that ended with before.
+    explains nearly all; beside another effect only if one explains most. `raced` is what that
+    ended with before.
     After one of `stops` it is what was found until then, and no further search begins.
     """
     found, runners = [*raced], list[Valve]()
@@ -75,13 +76,15 @@ def _run(
     else:
         heats.waiting = raced
     stem_only = len(group.stages) == 1 and PUT_TO_REST.isdisjoint(fitter.drive)
-    ended = heats.ended
-    if hastily and stem_only and ended and not (raced or heats.most(ended, odds.EXPLAINED['x'])):
+    beside = any(each.stage in group.stages for each in valve.candidates)
+    enough = heats.most(heats.ended, odds.MOSTLY if beside else odds.EXPLAINED['x'])
+    if hastily and stem_only and heats.ended and not (raced or enough):
         # one whose search takes long may explain all: before others are deepened in vain
         _run_slow(heats, slow, plainly=True)
-        ended = heats.ended
-    hasty = hastily and ended and not heats.nearly_all(ended[0])
+    ended = heats.ended
     mostly = heats.most(ended)
+    hasty = hastily and ended and not heats.nearly_all(ended[0])
+    hasty = hasty and (mostly or not beside)
     # in haste what explains most was deepened already
     if deeply and heats.runners and (mostly if hasty else not (raced and mostly)):
         ended = heats.runners = _deepened(heats, [*quick, *imitated])
