@@ -165,7 +165,8 @@ def _quickly(
     if found.outcome == 'unknown_effect':  # where little is left no slip hides much
         drive = fitter.drive
         caught = again
-        for most in range(1, MOST_EFFECTS + 1):
+        # with x alone one that takes long is more likely than two at once
+        for most in range(1, 2 if odds.x_alone(hasty.group) else MOST_EFFECTS + 1):
             fitter.drive = (*drive, CAUGHT)
             found = caught(base, candidates, hastily=True, most=most)
             fitter.drive = drive

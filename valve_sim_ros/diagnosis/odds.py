@@ -260,14 +260,15 @@ def explained(
 
     `blurred` is the excess that comes of the noise of a measured x.
     """
+    steps = {*names} == {COARSE}
     # p1 knows neither slips nor a chamber's laws: there the right one leaves little but noise
-    if after.excess > (ADEQUATE + blurred if signal == 'p1' else FAR_OFF):
+    if not steps and after.excess > (ADEQUATE + blurred if signal == 'p1' else FAR_OFF):
         least = EXPLAINED_BUT_FAR
     elif before.excess > FAR_OFF and not {*names}.isdisjoint(LASTING):
         least = EXPLAINED_LASTING
     elif after.excess <= CLEAN:
         least = LEAST_CLOSED
-    elif {*names} == {COARSE}:
+    elif steps:
         least = EXPLAINED_BY_STEPS
     else:
         least = EXPLAINED[signal] if len(names) == 1 else EXPLAINED_BY_TWO

@@ -78,7 +78,8 @@ def _run(
     stem_only = len(group.stages) == 1 and PUT_TO_REST.isdisjoint(fitter.drive)
     beside = any(each.stage in group.stages for each in valve.candidates)
     enough = heats.most(heats.ended, odds.MOSTLY if beside else odds.EXPLAINED['x'])
-    if hastily and stem_only and heats.ended and not (raced or enough):
+    early = stem_only and not raced if hastily else raced
+    if early and heats.ended and not enough:
         # one whose search takes long may explain all: before others are deepened in vain
         _run_slow(heats, slow, plainly=True)
     ended = heats.ended
