@@ -88,8 +88,6 @@ do not look like it are not tried."""
 TOO_LARGE = 1.2
 """An effect of more than this times its largest usual size stands for another. Of 154 right names
 none had more than 0.97 times that, of 19 wrong ones six had 1.08 to 3.3 times."""
-NEXT_TO_IT = 0.95
-"""Part of the gain of such a one that makes the best of a usual size the one it stands for."""
 LEAST_FIRST, LEAST_AGAIN = 0.1, 0.35
 """A first effect that closes less than this part of the excess is not followed by a second; nor in
 a second look, where slips do not hide what is missing, and where what the base valve leaves counts
@@ -143,13 +141,13 @@ def gain(before: float, after: Valve, left: Leftover) -> float:
 def choice(runners: Sequence[Valve], gains: Mapping[str, float]) -> Valve:
     """Return the best runner; of those the data do not tell apart, the most plausible.
 
-    One that is far larger than usual stands for another, which may be next to it.
+    One that is far larger than usual stands for another, which may come as close as a twin.
     """
     likely = [each for each in runners if not too_large(each, each.candidates[-1].effect)]
     best = max(gains.values())
     if likely:
         best_likely = max(gains[each.candidates[-1].effect] for each in likely)
-        if best_likely >= NEXT_TO_IT * best:
+        if best - best_likely < twin_limit(best, KNOWN_TWIN_SHARE):
             runners, best = likely, best_likely
     limit = twin_limit(best)
     close = [each for each in runners if best - gains[each.candidates[-1].effect] < limit]
