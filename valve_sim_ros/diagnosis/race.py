@@ -84,8 +84,7 @@ def _run(
         _run_slow(heats, slow, plainly=True)
     ended = heats.ended
     mostly = heats.most(ended)
-    hasty = hastily and ended and not heats.nearly_all(ended[0])
-    hasty = hasty and (mostly or not beside)
+    hasty = hastily and ended and (mostly or not beside) and not heats.nearly_all(ended[0])
     # in haste what explains most was deepened already
     if deeply and heats.runners and (mostly if hasty else not (raced and mostly)):
         ended = heats.runners = _deepened(heats, [*quick, *imitated])

@@ -19,7 +19,7 @@ NEUTRAL = 1.392
 """Factor of what is left where errors beyond DOUBTFUL are cut, so that noise alone costs the same:
 1 / sqrt(E[min(e^2, DOUBTFUL^2)]) of a normal e."""
 MOST_IN_DOUBT = 0.5
-"""Share of a record in which slips may be in doubt (valves of 76 records stay below 0.38): else a
+"""Share of a record in which slips may be in doubt (valves of 87 records stay below 0.38): else a
 stem that next to no p2 leaves where it would slip could be anywhere all the time."""
 STEM, BESIDE = 2, 3
 """Rows of x, and of the x to hold beside the measured one, among the outputs."""
