@@ -10,7 +10,7 @@ import sys
 import click
 from tqdm import tqdm
 
-from . import runner, sets, study
+from . import results, runner, sets, study
 from .table import as_markdown, as_text, one_by_one
 
 FOLDER = click.Path(path_type=Path)
@@ -80,14 +80,17 @@ def score(folder: Path, verdicts: Path | None, records: bool) -> None:
 @click.option('--seed', type=click.IntRange(0), default=0, show_default=True)
 @click.option('--out', type=FOLDER, default=Path('build/blind'), show_default=True)
 @click.option('--doc', type=FOLDER, help='Markdown file for the table.')
-def whole_study(split: str, share: float, seed: int, out: Path, doc: Path | None) -> None:
+@click.option('--keep', type=FOLDER, help='JSON lines of outcomes; what is there is not redone.')
+def whole_study(
+    split: str, share: float, seed: int, out: Path, doc: Path | None, keep: Path | None
+) -> None:
     """Generate, diagnose and score all sets; SHARE of their records."""
-    found = study.study(split, share, seed, out, bar)
+    version = results.version(Path(__file__).parents[1])
+    found = study.study(split, share, seed, out, bar, version, keep)
     for each in found:
         click.echo(as_text(each) + '\n')
     if doc:
         command = ' '.join(('python -m blind', *sys.argv[1:]))
-        version = study.version(Path(__file__).parents[1])
         aside = doc.with_name(f'.{doc.name}.part')
         aside.write_text(as_markdown(found, split, version, command), encoding='utf-8')
         os.replace(aside, doc)

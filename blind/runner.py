@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The verdicts on a set: one folder per record; those that exist are not made again."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from concurrent.futures import ProcessPoolExecutor
 from functools import partial
 from multiprocessing import get_context
@@ -55,6 +55,7 @@ def run(
     *,
     seed: int = 0,
     limit: int | None = None,
+    known: Collection[str] = (),
     workers: int = WORKERS,
     progress: Callable[[int], object] = lambda done: None,
 ) -> int:
@@ -68,6 +69,8 @@ def run(
         Of the diagnosis.
     limit : int, optional
         Only the first so many records.
+    known : collection of str, optional
+        Records that need no verdict.
     workers : int
         Processes.
     progress : callable
@@ -79,7 +82,11 @@ def run(
         Number of records that could not be diagnosed.
     """
     paths = sorted(each for each in (folder / 'records').iterdir() if each.name[0] != '.')[:limit]
-    missing = [path for path in paths if not (out / path.stem / 'seconds.json').exists()]
+    missing = [
+        path
+        for path in paths
+        if path.stem not in known and not (out / path.stem / 'seconds.json').exists()
+    ]
     progress(len(paths) - len(missing))
     with ProcessPoolExecutor(workers, mp_context=get_context('spawn')) as pool:
         for _ in pool.map(partial(one, folder, out, seed), missing):

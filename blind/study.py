@@ -5,10 +5,10 @@
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
-import subprocess
+from typing import Any
 
-from . import runner, sets
-from .outcomes import read_all, tried
+from . import results, runner, sets
+from .outcomes import Outcome, read_all, tried
 from .seal import read_json
 from .table import Scored
 
@@ -28,21 +28,6 @@ SETS = (
 Progress = Callable[[str, int], Callable[[int], object]]
 
 
-def version(root: Path) -> str:
-    """Return what git calls the version under test."""
-    try:
-        found = subprocess.run(
-            ('git', 'describe', '--always', '--dirty', '--exclude=*'),
-            cwd=root,
-            capture_output=True,
-            text=True,
-            check=True,
-        )
-    except (OSError, subprocess.CalledProcessError):
-        return 'unknown'
-    return found.stdout.strip()
-
-
 def scored(folder: Path, verdicts: Path) -> Scored:
     """Score one set."""
     about = read_json(folder / 'set.json')
@@ -50,7 +35,53 @@ def scored(folder: Path, verdicts: Path) -> Scored:
     return Scored(about['set'], signals, read_all(folder, verdicts), about['count'])
 
 
-def study(split: str, share: float, seed: int, out: Path, progress: Progress) -> list[Scored]:
+def place(about: dict[str, Any], out: Path) -> Path:
+    """Return the folder of a set."""
+    return out / f'{about["set"]}_{about["split"]}_{about["signals"].replace(",", "")}'
+
+
+def verdicts_of(about: dict[str, Any], out: Path) -> Path:
+    """Return the folder of what a version said about a set."""
+    return place(about, out) / f'verdicts-{about["version"]}'
+
+
+def diagnose(
+    about: dict[str, Any], wanted: int, out: Path, known: set[str], progress: Progress
+) -> None:
+    """Diagnose the first so many records of a set, but those known; generate them if need be."""
+    if len(known) >= wanted:
+        return
+    folder = place(about, out)
+    if not (folder / 'set.json').exists() or read_json(folder / 'set.json')['count'] < wanted:
+        bar = progress(f'{folder.name}: records', wanted)
+        signals = tuple(about['signals'].split(','))
+        sets.generate(about['set'], about['split'], signals, wanted, about['seed'], folder, bar)
+    bar = progress(f'{folder.name}: verdicts', wanted)
+    runner.run(folder, verdicts_of(about, out), limit=wanted, known=known, progress=bar)
+
+
+def outcomes(about: dict[str, Any], out: Path, kept: Path | None) -> list[Outcome]:
+    """Return all outcomes of a set, kept or new; the new ones are kept from then on."""
+    known = results.read(kept, about)
+    folder, verdicts = place(about, out), verdicts_of(about, out)
+    if (folder / 'set.json').exists() and tried(folder, verdicts):
+        names = {each.record for each in known}
+        new = [each for each in read_all(folder, verdicts) if each.record not in names]
+        if kept and new:
+            results.add(kept, about, new)
+        known = sorted([*known, *new], key=lambda each: each.record)
+    return known
+
+
+def study(
+    split: str,
+    share: float,
+    seed: int,
+    out: Path,
+    progress: Progress,
+    version: str,
+    kept: Path | None = None,
+) -> list[Scored]:
     """Generate and diagnose all sets, then open their keys; if interrupted, of those diagnosed.
 
     Parameters
@@ -65,21 +96,20 @@ def study(split: str, share: float, seed: int, out: Path, progress: Progress) ->
         Where sets and verdicts go; what is there already is used.
     progress : callable
         Given a title and a total, returns what is called with the number done.
+    version : str
+        The version under test.
+    kept : Path, optional
+        File of outcomes: what this version said before is not asked again, what is new is added.
     """
-    folders = []
-    for name, signals, count in SETS:
-        folder = out / f'{name}_{split}_{signals.replace(",", "")}'
-        wanted = max(round(share * count), 1)
-        if not (folder / 'set.json').exists():
-            bar = progress(f'{folder.name}: records', wanted)
-            sets.generate(name, split, tuple(signals.split(',')), wanted, seed, folder, bar)
-        folders.append(folder)
+    common = {'split': split, 'seed': seed, 'version': version}
+    abouts = [{'set': name, 'signals': signals, **common} for name, signals, _ in SETS]
+    counts = [count for _, _, count in SETS]
     with suppress(KeyboardInterrupt):
-        for folder in folders:
-            bar = progress(f'{folder.name}: verdicts', read_json(folder / 'set.json')['count'])
-            runner.run(folder, folder / 'verdicts', progress=bar)
-    return [
-        scored(folder, folder / 'verdicts')
-        for folder in folders
-        if tried(folder, folder / 'verdicts')
+        for about, count in zip(abouts, counts, strict=True):
+            known = {each.record for each in results.read(kept, about)}
+            diagnose(about, max(round(share * count), 1), out, known, progress)
+    found = [
+        Scored(about['set'], about['signals'], outcomes(about, out, kept), count)
+        for about, count in zip(abouts, counts, strict=True)
     ]
+    return [each for each in found if each.outcomes]

@@ -23,7 +23,7 @@ TARGETS = {
 
 
 class Scored(NamedTuple):
-    """A set with its outcomes; `signals` as in 'p2,x'; how many records were drawn for it."""
+    """A set with its outcomes; `signals` as in 'p2,x'; how many records a whole study has."""
 
     kind: str
     signals: str

@@ -4,6 +4,7 @@
 
 import json
 from pathlib import Path
+import subprocess
 import sys
 from types import SimpleNamespace
 
@@ -11,7 +12,7 @@ from click.testing import CliRunner
 import numpy as np
 import pytest
 
-from blind import runner, score, study, table
+from blind import results, runner, score, study, table
 from blind.__main__ import main
 from blind.continuation import gap_closed
 from blind.outcomes import FAILED, MISSING, Outcome, read_all, UNKNOWN
@@ -24,7 +25,7 @@ NONE = frozenset()
 def named(truth, *ids, twins=None, probability=0.9, **more):
     """Return an outcome in which these effects were named."""
     return Outcome(
-        'r',
+        more.pop('record', 'r'),
         truth,
         MISSING,
         ids,
@@ -191,25 +192,84 @@ def test_the_table_of_all_sets(one_record):
     assert '93.5 % stated, 50.0 % right' in text
 
 
+ABOUT = {'set': 'singles', 'signals': 'p2,x', 'split': 'test', 'seed': 0, 'version': 'abc1234'}
+
+
 def test_that_a_study_that_is_interrupted_scores_what_was_done(one_record, monkeypatch):
     home = one_record.folder / 'study'
     home.mkdir()
     (home / 'singles_test_p2x').symlink_to(one_record.folder)
+    one_record.verdict.parent.rename(one_record.folder / 'verdicts-abc1234')
     about = json.loads((one_record.folder / 'set.json').read_text())
     write_json(one_record.folder / 'set.json', {**about, 'count': 3})
-    sets = (('singles', 'p2,x', 3), ('clean', 'x', 1))
-    monkeypatch.setattr(study, 'SETS', sets)
+    monkeypatch.setattr(study, 'SETS', (('singles', 'p2,x', 3), ('clean', 'x', 1)))
+    asked = []
 
-    def interrupted(folder, out, progress):
-        (out / '0002').mkdir()
+    def interrupted(folder, out, limit, known, progress):
+        asked.append((folder.name, limit, known))
+        (out / '0002').mkdir(exist_ok=True)
         raise KeyboardInterrupt
 
     monkeypatch.setattr(runner, 'run', interrupted)
-    monkeypatch.setattr(study.sets, 'generate', lambda *some: write_json(some[5] / 'set.json', {}))
-    (home / 'clean_test_x').mkdir()
-    (found,) = study.study('test', 1.0, 0, home, lambda title, total: lambda done: None)
-    assert found.size == '1 of 3 records'
-    assert '## singles — u, p2, x: 1 of 3 records' in table.as_markdown([found], 'test', '', '')
+    kept = one_record.folder / 'kept.jsonl'
+    for share in (1.0, 1.0):
+        (found,) = study.study(
+            'test', share, 0, home, lambda title, total: lambda done: None, 'abc1234', kept
+        )
+        assert found.size == '1 of 3 records'
+        text = table.as_markdown([found], 'test', '', '')
+        assert '## singles — u, p2, x: 1 of 3 records' in text
+    # what was kept of the first is neither asked nor kept again
+    assert asked == [('singles_test_p2x', 3, set()), ('singles_test_p2x', 3, {'0001'})]
+    assert len(kept.read_text().splitlines()) == 1
+
+
+def test_that_a_study_whose_outcomes_are_kept_needs_no_record(tmp_path, monkeypatch):
+    kept = tmp_path / 'kept.jsonl'
+    results.add(kept, ABOUT, [named(('a',), 'b', twins=[frozenset('a')], record='0001')])
+    monkeypatch.setattr(study, 'SETS', (('singles', 'p2,x', 1),))
+    (found,) = study.study('test', 1.0, 0, tmp_path / 'none', None, 'abc1234', kept)
+    assert (found.size, counts('singles', found.outcomes)['within stated twins']) == (
+        '1 records',
+        1,
+    )
+
+
+def test_that_outcomes_are_kept_whole_and_by_version(tmp_path):
+    kept = tmp_path / 'kept.jsonl'
+    said = [
+        named(('a', 'b'), 'a', 'c', twins=[NONE, frozenset('bd')], seconds=4.5, closed=0.25),
+        Outcome('0003', (), 'adequate', seconds=2.0),
+        Outcome('0002', ('a',), FAILED),
+    ]
+    results.add(kept, ABOUT, said[:1])
+    results.add(kept, {**ABOUT, 'version': 'other'}, said[:1])
+    results.add(kept, ABOUT, said[1:])
+    assert results.read(kept, ABOUT) == [said[2], said[1], said[0]]
+    assert results.read(kept, {**ABOUT, 'seed': 1}) == []
+    assert results.read(None, ABOUT) == results.read(tmp_path / 'none', ABOUT) == []
+
+
+def test_the_version_is_that_of_the_package(tmp_path):
+    def git(*words):
+        identity = ('-c', 'user.name=n', '-c', 'user.email=e')
+        done = subprocess.run(('git', *identity, *words), cwd=tmp_path, check=True, stdout=-1)
+        return done.stdout.decode().strip()
+
+    git('init', '-q')
+    assert results.version(tmp_path) == 'unknown'
+    (tmp_path / 'valve_sim_ros').mkdir()
+    code = tmp_path / 'valve_sim_ros/model.py'
+    code.write_text('a = 1\n')
+    git('add', '.')
+    git('commit', '-qm', 'package')
+    commit = git('rev-parse', '--short', 'HEAD')
+    (tmp_path / 'doc.md').write_text('of no matter\n')
+    git('add', '.')
+    git('commit', '-qm', 'doc')
+    assert results.version(tmp_path) == commit
+    code.write_text('a = 2\n')
+    assert results.version(tmp_path) == f'{commit}-dirty'
 
 
 def stub(monkeypatch, diagnose):
