@@ -48,13 +48,12 @@ def generate(name: str, split: str, signals: str, count: int, seed: int, out: Pa
 @click.option('--out', type=FOLDER, help='Folder of the verdicts.  [default: FOLDER/verdicts]')
 @click.option('--seed', type=int, default=0, show_default=True)
 @click.option('--limit', type=click.IntRange(1), help='Only the first so many records.')
-@click.option('--workers', type=click.IntRange(1), default=runner.WORKERS, show_default=True)
-def run(folder: Path, out: Path | None, seed: int, limit: int | None, workers: int) -> None:
+def run(folder: Path, out: Path | None, seed: int, limit: int | None) -> None:
     """Diagnose the records of a set; those with a verdict are not done again."""
     out = out or folder / 'verdicts'
     records = len(os.listdir(folder / 'records'))
     progress = bar(f'{folder.name} verdicts', min(records, limit or records))
-    failed = runner.run(folder, out, seed=seed, limit=limit, workers=workers, progress=progress)
+    failed = runner.run(folder, out, seed=seed, limit=limit, progress=progress)
     if failed:
         raise click.ClickException(f'{failed} records failed: see the error.txt below {out}')
 
@@ -80,7 +79,7 @@ def score(folder: Path, verdicts: Path | None, records: bool) -> None:
 @click.option('--seed', type=click.IntRange(0), default=0, show_default=True)
 @click.option('--out', type=FOLDER, default=Path('build/blind'), show_default=True)
 @click.option('--doc', type=FOLDER, help='Markdown file for the table.')
-@click.option('--keep', type=FOLDER, help='JSON lines of outcomes; what is there is not redone.')
+@click.option('--keep', type=FOLDER, help='JSON lines of outcomes; those are not made again.')
 def whole_study(
     split: str, share: float, seed: int, out: Path, doc: Path | None, keep: Path | None
 ) -> None:

@@ -3,16 +3,12 @@
 """The verdicts on a set: one folder per record; those that exist are not made again."""
 
 from collections.abc import Callable, Collection
-from concurrent.futures import ProcessPoolExecutor
-from functools import partial
-from multiprocessing import get_context
 from pathlib import Path
 import time
 import traceback
 
 from .seal import read_json, write_json
 
-WORKERS = 2
 LEFT_OUT = 'left_out'
 """The set whose hidden effects are taken out of the catalogue, one record at a time."""
 
@@ -56,10 +52,9 @@ def run(
     seed: int = 0,
     limit: int | None = None,
     known: Collection[str] = (),
-    workers: int = WORKERS,
     progress: Callable[[int], object] = lambda done: None,
 ) -> int:
-    """Diagnose the records of a set that have no verdict yet.
+    """Diagnose the records of a set that have no verdict yet, one by one: each takes all cores.
 
     Parameters
     ----------
@@ -71,8 +66,6 @@ def run(
         Only the first so many records.
     known : collection of str, optional
         Records that need no verdict.
-    workers : int
-        Processes.
     progress : callable
         Called with 1 for each record that has a verdict.
 
@@ -88,7 +81,7 @@ def run(
         if path.stem not in known and not (out / path.stem / 'seconds.json').exists()
     ]
     progress(len(paths) - len(missing))
-    with ProcessPoolExecutor(workers, mp_context=get_context('spawn')) as pool:
-        for _ in pool.map(partial(one, folder, out, seed), missing):
-            progress(1)
+    for path in missing:
+        one(folder, out, seed, path)
+        progress(1)
     return sum((out / path.stem / 'error.txt').exists() for path in paths)

@@ -309,7 +309,5 @@ def test_that_a_diagnosis_that_breaks_counts_as_failed(one_record, monkeypatch):
 
 def test_that_records_with_a_verdict_are_not_done_again(one_record):
     done = []
-    failed = runner.run(
-        one_record.folder, one_record.folder / 'verdicts', workers=1, progress=done.append
-    )
+    failed = runner.run(one_record.folder, one_record.folder / 'verdicts', progress=done.append)
     assert (failed, done) == (0, [1])
