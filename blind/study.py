@@ -89,7 +89,7 @@ def study(
     split : str
         Which half.
     share : float
-        Share of each set's records.
+        Share of each set's records; with 0 only what is kept is scored.
     seed : int
         Seed of all sets.
     out : Path
@@ -107,7 +107,7 @@ def study(
     with suppress(KeyboardInterrupt):
         for about, count in zip(abouts, counts, strict=True):
             known = {each.record for each in results.read(kept, about)}
-            diagnose(about, max(round(share * count), 1), out, known, progress)
+            diagnose(about, round(share * count), out, known, progress)
     found = [
         Scored(about['set'], about['signals'], outcomes(about, out, kept), count)
         for about, count in zip(abouts, counts, strict=True)

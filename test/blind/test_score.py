@@ -228,11 +228,10 @@ def test_that_a_study_whose_outcomes_are_kept_needs_no_record(tmp_path, monkeypa
     kept = tmp_path / 'kept.jsonl'
     results.add(kept, ABOUT, [named(('a',), 'b', twins=[frozenset('a')], record='0001')])
     monkeypatch.setattr(study, 'SETS', (('singles', 'p2,x', 1),))
-    (found,) = study.study('test', 1.0, 0, tmp_path / 'none', None, 'abc1234', kept)
-    assert (found.size, counts('singles', found.outcomes)['within stated twins']) == (
-        '1 records',
-        1,
-    )
+    for share in (0.0, 1.0):
+        (found,) = study.study('test', share, 0, tmp_path / 'none', None, 'abc1234', kept)
+        assert found.size == '1 records'
+        assert counts('singles', found.outcomes)['within stated twins'] == 1
 
 
 def test_that_outcomes_are_kept_whole_and_by_version(tmp_path):
