@@ -23,7 +23,7 @@ def version(root: Path, package: str = 'valve_sim_ros') -> str:
         return found.stdout.strip()
 
     try:
-        commit = git('log', '-1', '--format=%h')
+        commit = git('log', '-1', '--abbrev=7', '--format=%h')
         return commit + '-dirty' * bool(git('status', '--porcelain'))
     except (OSError, subprocess.CalledProcessError):
         return 'unknown'
