@@ -86,6 +86,8 @@ def whole_study(
     """Generate, diagnose and score all sets; SHARE of their records."""
     version = results.version(Path(__file__).parents[1])
     found = study.study(split, share, seed, out, bar, version, keep)
+    if not found:
+        raise click.ClickException(f'no outcomes of version {version} yet: give a larger --share')
     for each in found:
         click.echo(as_text(each) + '\n')
     if doc:

@@ -37,7 +37,8 @@ def scored(folder: Path, verdicts: Path) -> Scored:
 
 def place(about: dict[str, Any], out: Path) -> Path:
     """Return the folder of a set."""
-    return out / f'{about["set"]}_{about["split"]}_{about["signals"].replace(",", "")}'
+    signals = about['signals'].replace(',', '')
+    return out / f'{about["set"]}_{about["split"]}{about["seed"]}_{signals}'
 
 
 def verdicts_of(about: dict[str, Any], out: Path) -> Path:

@@ -198,7 +198,7 @@ ABOUT = {'set': 'singles', 'signals': 'p2,x', 'split': 'test', 'seed': 0, 'versi
 def test_that_a_study_that_is_interrupted_scores_what_was_done(one_record, monkeypatch):
     home = one_record.folder / 'study'
     home.mkdir()
-    (home / 'singles_test_p2x').symlink_to(one_record.folder)
+    (home / 'singles_test0_p2x').symlink_to(one_record.folder)
     one_record.verdict.parent.rename(one_record.folder / 'verdicts-abc1234')
     about = json.loads((one_record.folder / 'set.json').read_text())
     write_json(one_record.folder / 'set.json', {**about, 'count': 3})
@@ -220,7 +220,7 @@ def test_that_a_study_that_is_interrupted_scores_what_was_done(one_record, monke
         text = table.as_markdown([found], 'test', '', '')
         assert '## singles — u, p2, x: 1 of 3 records' in text
     # what was kept of the first is neither asked nor kept again
-    assert asked == [('singles_test_p2x', 3, set()), ('singles_test_p2x', 3, {'0001'})]
+    assert asked == [('singles_test0_p2x', 3, set()), ('singles_test0_p2x', 3, {'0001'})]
     assert len(kept.read_text().splitlines()) == 1
 
 
@@ -232,6 +232,16 @@ def test_that_a_study_whose_outcomes_are_kept_needs_no_record(tmp_path, monkeypa
         (found,) = study.study('test', share, 0, tmp_path / 'none', None, 'abc1234', kept)
         assert found.size == '1 records'
         assert counts('singles', found.outcomes)['within stated twins'] == 1
+
+
+def test_that_no_outcomes_leave_the_table_alone(tmp_path):
+    doc = tmp_path / 'blind.md'
+    doc.write_text('as it was')
+    words = ['study', '--share', '0', '--out', str(tmp_path), '--doc', str(doc)]
+    said = CliRunner().invoke(main, words)
+    assert said.exit_code == 1
+    assert 'give a larger --share' in said.output
+    assert doc.read_text() == 'as it was'
 
 
 def test_that_outcomes_are_kept_whole_and_by_version(tmp_path):
