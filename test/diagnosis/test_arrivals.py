@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Commands that come just when samples are taken."""
 
+from dataclasses import replace
 import itertools
 
 import numpy as np
@@ -9,6 +10,12 @@ import pytest
 
 from valve_sim_ros import simulate
 from valve_sim_ros.diagnosis import diagnose
+from valve_sim_ros.diagnosis.base_valve import starting_valve
+from valve_sim_ros.diagnosis.bench import Bench
+from valve_sim_ros.diagnosis.clues import clues
+from valve_sim_ros.diagnosis.fitting import Fitter
+from valve_sim_ros.diagnosis.stages import groups
+from valve_sim_ros.diagnosis.unknowns import BLEND
 from valve_sim_ros.recordings.recording import Recording
 
 VALVE = {'f_d1': 0.5, 'T_g1': 8.0, 'T_g2': 30.0, 'f_s': 4.0, 'f_d': 2.4}
@@ -183,3 +190,12 @@ def ramps_and_steps(fine=10, **effect):
     seen = slice(None, None, fine)
     noisy = [each[seen] + 0.2 * rng.standard_normal(each[seen].size) for each in (run.p1, run.p2)]
     return Recording(run.t[seen], u[seen], *noisy)
+
+
+def test_a_lag_is_also_sought_where_ramps_come_with_steps():
+    """That ramps are late by most of a period may have made up for it."""
+    fitter = Fitter(Bench([ramps_and_steps()]), nuisances=frozenset({BLEND}))
+    group = groups(fitter.bench.signals)[0]
+    base = starting_valve(fitter.bench)
+    shown = clues(fitter, group, replace(base, values={**base.values, 'blend': 0.9}))
+    assert [each['blend'] for each in shown.lags] == [0.0]

@@ -24,6 +24,7 @@ from .seen import (
 from .stages import Candidate, Group
 from .starts import friction_grid, grid, START, Starts
 from .stretch import RESTS
+from .unknowns import BLEND
 
 LAGS = ('T_g1', 'T_g2')
 
@@ -74,6 +75,8 @@ def clues(fitter: Fitter, group: Group, valve: Valve) -> Clues:
     """Return what the record shows beside a run of the valve."""
     free = {each.name: each for each in fitter.unknowns(group)}
     lags = grid([free[name] for name in LAGS if name in free])
+    if BLEND.name in free:  # that ramps are late may have made up for a lag
+        lags = [{**each, BLEND.name: 0.0} for each in lags]
     if not group.has_stem:
         return Clues(valve.values['f_s'], lags)
     bench, results = fitter.bench, fitter.results(valve)
