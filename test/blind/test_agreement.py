@@ -83,6 +83,11 @@ SAME = {
 
 OTHER_FORMS = [
     (
+        'chamber_volume',
+        {'volume': 1.5, 'volume_absolute': 40.0},
+        {'ratio': 1.5, 'displacement': 1.0, 'absolute_pressure': 40.0},
+    ),
+    (
         'ip_lag',
         {'smoothing': 1.5, 'smoothing_error': FAR},
         {'time_constant': 1.5, 'upstream': 1.0},

@@ -10,9 +10,6 @@ from numba import njit
 from ..declarations import Effect, EffectParameter
 from ..state import Motion, moved
 
-ABSOLUTE = 150.0
-"""Absolute pressure at p2 = 0 [% of span]: 1.2 bar where the span is 0.2 to 1.0 bar."""
-
 
 @njit
 def flow(value: Any, state: Any, p: Any, memory: Any, dt: float) -> tuple[float, float]:
@@ -27,12 +24,12 @@ def motion(value: Any, state: Any, p: Any, memory: Any, dt: float) -> Motion:
 
     The place before is kept: where a search puts the stem elsewhere, the air gives way too.
     """
-    ratio, displacement = p
+    ratio, displacement, absolute = p
     place = value.stem.x + 0.5 * dt * value.stem.v
     before = max(1.0 + ratio * (state.x if math.isnan(memory[0]) else memory[0]) / 100.0, 0.05)
     after = max(1.0 + ratio * place / 100.0, 0.05)
     memory[0] = place
-    change = (value.p2 + ABSOLUTE) * (before / after - 1.0)
+    change = (value.p2 + absolute) * (before / after - 1.0)
     return moved(value, value.stem, value.p2 + displacement * change)
 
 
@@ -60,9 +57,19 @@ EFFECT = Effect(
             0.0,
             1.5,
             'linear',
-            'Share of the pressure change by the moving stem; 1 is isothermal air at an absolute '
-            'pressure of 150 % of span where p2 = 0',
+            'Share of the pressure change by the moving stem; 1 is isothermal air',
             starts=(0.3, 0.9),
+        ),
+        EffectParameter(
+            'absolute_pressure',
+            'p_abs',
+            '%',
+            150.0,
+            5.0,
+            400.0,
+            'log',
+            'Absolute pressure where p2 = 0; 152 with 0.2 to 1.0 bar',
+            neutral=150.0,
         ),
     ),
     slots={'flow_slot': flow, 'motion_slot': motion},
@@ -70,7 +77,7 @@ EFFECT = Effect(
     stride=0.01,
     order=10,
     feedback=True,
-    variants=(('ratio',), ('ratio', 'displacement')),
+    variants=(('ratio',), ('ratio', 'displacement', 'absolute_pressure')),
     explanation='The opening stem enlarges the chamber, so the same flow raises p2 more slowly.',
     symptom='Rates of p2 fall as x opens; p2 dips at each slip.',
     confirm='Compare the time constants of small steps of u at 20 % and at 80 %.',
