@@ -323,6 +323,17 @@ def test_a_stem_that_slips_when_the_record_begins_is_put_where_it_comes_to_rest(
     assert np.nanmax(np.abs(bench.residual(result, 'x'))) < 6.0
 
 
+@pytest.mark.parametrize(('level', 'T_g2'), [(54.0, 20.0), (52.0, 15.0), (50.0, 30.0)])
+def test_a_stem_that_slips_when_the_record_begins_and_then_creeps_is_not_held(level, T_g2):
+    levels = ((50, 70.0), (600, level), (600, 80.0))
+    slow, truth, record = slow_valve(levels, 0.3, T_g1=12.0, T_g2=T_g2, f_s=10.0)
+    begin = int(np.argmax(np.abs(np.diff(truth.x)) > 1.0)) - 4
+    bench = Bench([record.slice(0.2 * begin, np.inf)])
+    start = {f'{name}_0': truth.output(name)[begin] for name in ('p1', 'p2', 'x')}
+    result = bench.run(complete({**slow, **start}))
+    assert np.nanmax(np.abs(bench.residual(result, 'x'))) < 6.0
+
+
 def test_a_positioner_can_be_given_any_gain_of_the_catalogue():
     u = np.repeat([90.0, 5.0], 200)
     run = simulate(

@@ -116,9 +116,11 @@ class Bench:
                 period = float(np.median(np.diff(stretch.time)))
                 stretch.speed = pace(whole, departed, noise) / period
                 if not stretch.speed:  # one that creeps seems to rest
-                    if departed < FEW:  # it begins within a slip and rests only then
+                    if departed < FEW:  # it begins within a slip and rests only then, or creeps
                         rest = departed + FEW
-                        departed = rest + (travelled(stretch.held[rest:], surely) or samples.size)
+                        further = travelled(stretch.held[rest:], surely) or samples.size
+                        creeps = pace(whole[rest:], further, noise)
+                        departed = 0 if creeps else rest + further
                     # a first slip that was seen on its way must not be put to rest there
                     seen = samples < departed - REST
                     stretch.begins['x'] = np.where(seen, stretch.rests, np.nan)
