@@ -122,7 +122,8 @@ def _run_slow(heats: Heats, slow: Sequence[Candidate], *, plainly: bool = False)
     hidden = [each for each in slow if left < FAINT and odds.imitates(valve, each.effect)]
     if heats.nearly_all(best):
         slow = [each for each in slow if each in hidden or _like(best, each)]
-    elif best is not valve and left < (odds.CLEAN if valve.candidates else FAINT):
+    little = odds.CLEAN if valve.candidates else FAINT if group.has_stem else odds.SPOTLESS
+    if best is not valve and left < little:
         slow = [each for each in slow if each in hidden or not each.laborious]
     # a law with one more parameter is tried only where the plain one leaves something
     further = [each for each in slow if group.has_stem and each.extends(slow)]
