@@ -80,11 +80,19 @@ def score(folder: Path, verdicts: Path | None, records: bool) -> None:
 @click.option('--out', type=FOLDER, default=Path('build/blind'), show_default=True)
 @click.option('--doc', type=FOLDER, help='Markdown file for the table.')
 @click.option('--keep', type=FOLDER, help='JSON lines of outcomes; those are not made again.')
+@click.option('--of', 'said_by', help='Only score what this version said before.')
 def whole_study(
-    split: str, share: float, seed: int, out: Path, doc: Path | None, keep: Path | None
+    split: str,
+    share: float,
+    seed: int,
+    out: Path,
+    doc: Path | None,
+    keep: Path | None,
+    said_by: str | None,
 ) -> None:
     """Generate, diagnose and score all sets; SHARE of their records."""
-    version = results.version(Path(__file__).parents[1])
+    version = said_by or results.version(Path(__file__).parents[1])
+    share = 0.0 if said_by else share
     found = study.study(split, share, seed, out, bar, version, keep)
     if not found:
         raise click.ClickException(f'no outcomes of version {version} yet: give a larger --share')

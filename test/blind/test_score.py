@@ -234,6 +234,17 @@ def test_that_a_study_whose_outcomes_are_kept_needs_no_record(tmp_path, monkeypa
         assert counts('singles', found.outcomes)['within stated twins'] == 1
 
 
+def test_that_what_another_version_said_can_be_scored(tmp_path):
+    kept = tmp_path / 'kept.jsonl'
+    about = {'set': 'singles', 'signals': 'p2,x', 'split': 'test', 'seed': 5, 'version': 'old1234'}
+    results.add(kept, about, [named(('a',), 'a', record='0001')])
+    words = ['study', '--seed', '5', '--out', str(tmp_path), '--keep', str(kept), '--of']
+    said = CliRunner().invoke(main, [*words, 'old1234'])
+    assert said.exit_code == 0
+    assert '1 of 150 records' in said.output
+    assert CliRunner().invoke(main, [*words, 'new1234']).exit_code == 1
+
+
 def test_that_no_outcomes_leave_the_table_alone(tmp_path):
     doc = tmp_path / 'blind.md'
     doc.write_text('as it was')
