@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from valve_sim_ros import simulate
-from valve_sim_ros.diagnosis import diagnose
+from valve_sim_ros.diagnosis import diagnose, odds
 from valve_sim_ros.diagnosis.base_valve import starting_valve
 from valve_sim_ros.diagnosis.bench import Bench
 from valve_sim_ros.diagnosis.clues import clues
@@ -198,4 +198,19 @@ def test_a_lag_is_also_sought_where_ramps_come_with_steps():
     group = groups(fitter.bench.signals)[0]
     base = starting_valve(fitter.bench)
     shown = clues(fitter, group, replace(base, values={**base.values, 'blend': 0.9}))
-    assert [each['blend'] for each in shown.lags] == [0.0]
+    assert {'blend': 0.0} in shown.lags
+
+
+@pytest.mark.parametrize(
+    ('effect', 'parameter', 'late'),
+    [('ip_lag', 'time_constant', 0.22), ('ip_dead_time', 'dead_time', 0.28)],
+)
+def test_what_is_late_by_more_than_a_period_is_no_phase(effect, parameter, late):
+    """Where p2 alone tells it, a base valve a whole period late leaves next to nothing."""
+    u = np.repeat(np.random.default_rng(2).uniform(10.0, 90.0, 60), 60 * 4)
+    given = {'effects': [effect], f'{effect}.{parameter}': late}
+    record = sampled(u, 4, T_g1=4.0, T_g2=9.0, **given)
+    found = diagnose([Recording(record.time, record.u, p2=record.p2)])
+    assert found.ladders[0].before.excess < odds.LEAST_EXCESS['p2']
+    (named,) = found.effects
+    assert effect in {named.rung.effect, *named.rung.twins}

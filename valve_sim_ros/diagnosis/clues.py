@@ -76,7 +76,7 @@ def clues(fitter: Fitter, group: Group, valve: Valve) -> Clues:
     free = {each.name: each for each in fitter.unknowns(group)}
     lags = grid([free[name] for name in LAGS if name in free])
     if BLEND.name in free:  # that ramps are late may have made up for a lag
-        lags = [{**each, BLEND.name: 0.0} for each in lags]
+        lags = [*lags, {BLEND.name: 0.0}]
     if not group.has_stem:
         return Clues(valve.values['f_s'], lags)
     bench, results = fitter.bench, fitter.results(valve)

@@ -93,7 +93,7 @@ def climb(
             return odds.unfinished(left, odds.MORE_EXCESS)
         if named and not odds.unfinished(left, odds.CLEAN):
             return False
-        return odds.suspicious(left, group, fitter.bench.mixed)
+        return odds.late(now, group) or odds.suspicious(left, group, fitter.bench.mixed)
 
     def chance_apart(valve: Valve, left: Leftover) -> Leftover:
         """Return what is left but for slips that hang on noise, all if it is worth a look."""

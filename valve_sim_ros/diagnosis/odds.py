@@ -9,7 +9,7 @@ from ..model.effects import CATALOGUE
 from .adequacy import Leftover
 from .fitting import Valve
 from .stages import Group
-from .unknowns import declared, SLOWEST
+from .unknowns import declared, PHASE, SLOWEST
 
 ENOUGH = 25.0
 """Least gain in half log-likelihoods of independent samples for any name."""
@@ -65,6 +65,8 @@ if neither p1 nor p2 is measured."""
 SLIGHT, SLIGHT_CLOSED = {'p1': 0.0, 'p2': 0.25, 'x': 0.0}, 0.8
 """Excess below which a name needs as much gain as a further one and must close this part of it:
 jitter leaves as much of p2, and a quick exhaust fits that a little."""
+LATEST = -0.99
+"""Phase beyond which commands act a whole period late."""
 LEAST_FAR = 3
 """So many errors of x beyond any noise do as well: a few slips come at another moment."""
 ADEQUATE = 0.8
@@ -97,6 +99,14 @@ LEAST_LED = 0.7
 TWIN_GAIN, TWIN_SHARE, KNOWN_TWIN_SHARE = 12.0, 0.003, 0.02
 """Rivals whose gain is less than this, or this share of the gain, behind cannot be excluded; those
 that are declared to look alike need not come as close."""
+
+
+def late(base: Valve, group: Group) -> bool:
+    """Tell whether p2 shows commands so late that more than the phase of its samples may be late.
+
+    Where p1 is measured that tells.
+    """
+    return group.stages == ('u-p1', 'p1-p2') and base.values[PHASE.name] < LATEST
 
 
 def suspicious(left: Leftover, group: Group, mixed: bool) -> bool:
