@@ -193,7 +193,8 @@ def test_a_coarse_sensor_shows_its_steps(offset):
 
 
 def test_a_stem_put_to_rest_displaces_the_air_it_would_have_moved():
-    effects = {'chamber_volume.ratio': 1.5, 'chamber_volume.displacement': 1.0}
+    names = ('ratio', 'displacement', 'absolute_pressure')
+    effects = {f'chamber_volume.{n}': v for n, v in zip(names, (1.5, 1.0, 150.0), strict=True)}
     record = recording(**effects)
     bench = Bench([record])
     start = {'p1_0': 0.0, 'p2_0': 0.0, 'x_0': 0.0}
