@@ -95,7 +95,8 @@ def whole_study(
     share = 0.0 if said_by else share
     found = study.study(split, share, seed, out, bar, version, keep)
     if not found:
-        raise click.ClickException(f'no outcomes of version {version} yet: give a larger --share')
+        advice = 'expected one that --keep names' if said_by else 'give a larger --share'
+        raise click.ClickException(f'no outcomes of version {version}, seed {seed}: {advice}')
     for each in found:
         click.echo(as_text(each) + '\n')
     if doc:

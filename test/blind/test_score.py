@@ -242,7 +242,9 @@ def test_that_what_another_version_said_can_be_scored(tmp_path):
     said = CliRunner().invoke(main, [*words, 'old1234'])
     assert said.exit_code == 0
     assert '1 of 150 records' in said.output
-    assert CliRunner().invoke(main, [*words, 'new1234']).exit_code == 1
+    refused = CliRunner().invoke(main, [*words, 'new1234'])
+    assert refused.exit_code == 1
+    assert 'version new1234, seed 5: expected one that --keep names' in refused.output
 
 
 def test_that_no_outcomes_leave_the_table_alone(tmp_path):
