@@ -411,6 +411,32 @@ def test_what_pushes_a_stem_need_not_run_again_with_it(effects, off):
     assert np.abs(moved[1] - result[1]).max() > 1.0
 
 
+@pytest.mark.parametrize('phase', [0.0, 0.5, -0.5])
+@pytest.mark.parametrize('ramp', [False, True])
+def test_an_unknown_p1_drives_p2_where_it_was_not_measured_as_well(ramp, phase):
+    sent = commands(600)
+    if ramp:
+        sent = np.interp(np.arange(sent.size), np.arange(0, sent.size, 50), sent[::50])
+    fine = np.interp(np.arange(0.0, sent.size, 0.1), np.arange(sent.size), sent)
+    came = fine if ramp else np.roll(np.repeat(sent, 10), -round(10 * phase))
+    # the valve receives what no stage tells: another range
+    valve = {name: VALUES[name] for name in ('f_d1', 'T_g1', 'T_g2')}
+    truth = simulate(0.7 * came + 9.0, 0.02, valve)
+    rng = np.random.default_rng(3)
+    p1, p2 = (each[::10] + 0.1 * rng.standard_normal(sent.size) for each in (truth.p1, truth.p2))
+    p1 = np.where(rng.random(p1.size) < 0.02, np.nan, p1)
+    bench = Bench([Recording(truth.t[::10], sent, p1, p2)])
+    values = complete({**VALUES, 'phase': phase})
+
+    def excess():
+        return leftover(bench.residual(bench.run(values, (), ('p1',)), 'p2')).excess
+
+    wrong = excess()
+    bench.stretches[0].stand_alone('p1')
+    assert wrong > 1.0
+    assert excess() < 0.3
+
+
 def test_the_cheapest_are_right_where_costs_stop_counting_at_a_bound():
     costs = np.append(np.random.default_rng(3).permutation(200), 200.0)
 

@@ -115,6 +115,9 @@ def climb_all(
             # what is wrong here must not be blamed on the stages that follow; a stem that is
             # driven by a noisy p2 would slip at other moments
             fitter.drive = (*fitter.drive, group.signal)
+        if ladder.outcome == 'unknown_effect':
+            for stretch in fitter.bench.stretches:
+                stretch.stand_alone(group.signal)
     fitter.drive = ()
     return but_seats(ladders), base
 

@@ -14,6 +14,7 @@ from ..model.pipeline import Array
 from ..recordings.recording import OUTPUTS
 from .interleaving import interleaved, Rows, spread
 from .pushing import finer
+from .readings import filled
 
 KEPT_GRIDS = 60
 RESTS, SOON, CAUGHT, ON_TIME = 'x', 'x caught soon', 'x caught', 'x caught on time'
@@ -59,7 +60,8 @@ class Stretch:
     between its slips. `shown` are the commands of the recording, where `u` are those that the
     valve is taken to have received; nobody knows whether the steps at the samples `unsure` came
     with a command that was lost just before. `sooner` is by how much sooner than the others the
-    command of a sample came [periods].
+    command of a sample came [periods]. `alone` are signals that no stage tells, without gaps,
+    and their slopes [%/s].
     """
 
     time: Array
@@ -73,6 +75,7 @@ class Stretch:
     held: Array = field(default_factory=lambda: np.empty(0))
     unsure: Rows = field(default_factory=lambda: np.empty(0, dtype=np.intp))
     sooner: Array = field(default_factory=lambda: np.empty(0))
+    alone: dict[str, tuple[Array, Array]] = field(default_factory=dict)
     _grids: dict[Any, Grid] = field(default_factory=dict)
     _samples: dict[tuple[str, ...], Array] = field(default_factory=dict)
 
@@ -160,6 +163,30 @@ class Stretch:
                 each['p1'] = each['p1'].copy()
                 each['p1'][rows[rows < self.time.size]] = np.nan
 
+    def stand_alone(self, name: str) -> None:
+        """Let only what was measured of a signal drive what follows, between samples as well.
+
+        The stage before it would tell lost samples wrongly.
+        """
+        whole = filled(self.measured[name])
+        slopes = np.diff(whole) / np.diff(self.time)
+        before, after = np.append(0.0, slopes), np.append(slopes, 0.0)
+        least = np.sign(after) * np.minimum(np.abs(before), np.abs(after))
+        self.alone[name] = whole, np.where(before * after > 0.0, least, 0.0)
+        self._samples.clear()
+        self._grids.clear()
+
+    def _alone(self, name: str, now: Array, u: Array, rows: Rows) -> Array:
+        """Return a signal that no stage tells, halfway from each row to the next.
+
+        It has answered a command that came since the sample before, and goes on as it did.
+        """
+        before = np.searchsorted(rows, np.arange(u.size), side='right') - 1
+        told_by = np.minimum(before + (u != u[rows[before]]), self.time.size - 1)
+        halfway = now + 0.5 * np.diff(now, append=now[-1:])
+        whole, slope = self.alone[name]
+        return whole[told_by] + slope[told_by] * (halfway - self.time[told_by])
+
     def _moved(self, phase: float, drive: tuple[str, ...], blend: float, lead: float) -> Grid:
         sent = blended(self.u, blend) if blend else self.u
         ahead = lead * goes_on(sent) if lead else 0.0
@@ -168,6 +195,8 @@ class Stretch:
         if FINELY in drive:
             now, dt, u, rows = finer(now, dt, u, rows)
         at_rows = spread(self._at_samples(drive), rows, u.size)
+        for name in {*self.alone} & {*drive}:
+            at_rows[OUTPUTS.index(name)] = self._alone(name, now, u, rows)
         if HELD in drive:
             # what a loop sees at the end of a step
             at_rows[STEM] = np.interp(np.append(now[1:], np.inf), self.time, self.held)
