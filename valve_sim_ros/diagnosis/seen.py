@@ -33,9 +33,10 @@ LEAST_RESTS = 20
 DWELL, DWELLS, SCATTER = 'dwell_friction', tuple(np.geomspace(0.5, 200.0, 16).tolist()), 0.2
 """The effect, time constants that are tried [s], and how far what holds the stem scatters [%]."""
 DRIFT, WANDER = 'friction_drift', 'sensor_drift'
-SETTLINGS, TOLD_BETTER = (0.0, *np.geomspace(2.0, 40.0, 8).tolist()), 0.5
-"""The effects, rates at which they settle that are tried [1/h], and the part of what scatters that
-one leaves at most that is told by rests alone."""
+SETTLINGS, TOLD_BETTER, AS_WELL = (0.0, *np.geomspace(2.0, 40.0, 8).tolist()), 0.5, 1.3
+"""The effects, rates at which they settle that are tried [1/h], the part of what scatters that
+one leaves at most that is told by rests alone, and up to how many times the least another rate
+may leave."""
 STOPS, OUTERMOST, BEYOND, LEAST_PRESSED = 'travel_stops', 0.01, 1.0, 5
 """The effect, the share of rests that may lie beyond a stop, by how much more is left unmoved
 there than holds the stem elsewhere [% of span], and samples that show how far one yields."""
@@ -118,7 +119,7 @@ def dwell_seen(bench: Bench, results: Sequence[Array]) -> Starts:
 def drift_seen(
     bench: Bench, results: Sequence[Array], effect: str = DRIFT, scatters: float = 1.0
 ) -> Starts:
-    """Return starts of a friction or a sensor that drifts, one for each form of the law.
+    """Return starts of a friction or a sensor that drifts, at least one for each form of the law.
 
     From what holds the stem when it leaves each rest: it is straight in the drift, how soon that
     settles is tried. Friction holds it against its way, a sensor shows more or less either way.
@@ -144,10 +145,14 @@ def drift_seen(
     found = []
     for some in (SETTLINGS[:1], SETTLINGS[1:]):
         laws = [(*fitted(np.array([drifted(t, k) for t in time])), k) for k in some]
-        f_s, more, left_over, settling = min(laws, key=lambda law: law[2])
-        if f_s > 0.0 and left_over < scatters * constant:
-            rate = more / f_s if effect == DRIFT else more
-            found.append({'f_s': f_s, f'{effect}.rate': rate, f'{effect}.settling': settling})
+        laws.sort(key=lambda law: law[2])
+        least = laws[0][2]
+        for f_s, more, left_over, settling in laws if least < scatters * constant else ():
+            # few rests hardly tell how soon it settles
+            if f_s > 0.0 and left_over <= AS_WELL * least:
+                rate = more / f_s if effect == DRIFT else more
+                values = {f'{effect}.rate': rate, f'{effect}.settling': settling}
+                found.append({'f_s': f_s, **values})
     return found
 
 
