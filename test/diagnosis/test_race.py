@@ -25,7 +25,7 @@ LABORIOUS, QUICK = 'stribeck_friction', 'fluid_force'
 def steps(monkeypatch):
     """Return what names the steps of a race in which each effect closes a share of the gap."""
 
-    def run(closes, gap=50.0, beside=(), **how):
+    def run(closes, gap=50.0, beside=(), sized=(), **how):
         u = np.repeat(np.random.default_rng(5).uniform(10.0, 90.0, 40), 50)
         s = simulate(u)
         fitter = Fitter(Bench([Recording(s.t, u, s.p1, s.p2, s.x)]))
@@ -39,7 +39,8 @@ def steps(monkeypatch):
 
         def screened(fitter, candidate, *rest):
             done.append(candidate.effect)
-            there = replace(base, candidates=(candidate,))
+            values = {**base.values, **candidate.neutral, **dict(sized)}
+            there = replace(base, values=values, candidates=(candidate,))
             return replace(there, cost=(1.0 - share(there)) * base.cost)
 
         def same(self, valve, *rest):
@@ -92,6 +93,15 @@ def test_one_that_costs_far_more_than_the_best_is_not_refined(second, longer, st
     _, done = steps({'friction_asymmetry': 0.6, QUICK: second})
     assert (f'{QUICK} refined' in done) == longer
     assert 'friction_asymmetry refined' in done
+
+
+@pytest.mark.parametrize(('force', 'tried'), [(15.0, False), (40.0, True)])
+def test_others_are_tried_beside_one_far_larger_than_usual_whatever_it_explains(
+    force, tried, steps
+):
+    closes = {QUICK: 0.9999, 'linkage_backlash': 0.5, LABORIOUS: 0.5}
+    _, done = steps(closes, sized={f'{QUICK}.force': force})
+    assert ('linkage_backlash' in done) == (LABORIOUS in done) == tried
 
 
 @pytest.mark.parametrize(('gap', 'tried'), [(0.5, True), (0.01, False)])

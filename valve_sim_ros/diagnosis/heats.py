@@ -82,8 +82,12 @@ class Heats:
         return leftover(self.fitter.residuals(runner, self.group.signal))
 
     def nearly_all(self, runner: Valve) -> bool:
-        """Tell whether it closes so much of the gap that effects that take long are not tried."""
-        return odds.nearly_all(self.before, self.left_by(runner))
+        """Tell whether it closes so much of the gap that only effects like it are tried further.
+
+        An effect far larger than usual stands for another, which may not have begun.
+        """
+        large = any(odds.too_large(runner, each.effect) for each in runner.candidates[-1:])
+        return not large and odds.nearly_all(self.before, self.left_by(runner))
 
     def most(self, runners: Sequence[Valve], part: float = odds.MOSTLY) -> bool:
         """Tell whether the best of these closes most of the gap, or a given part of it."""
