@@ -68,6 +68,12 @@ def fitted(record):
     return fitter, fitter.fit(start, fitter.problem(STEM, start))
 
 
+def beside(base, candidate, cost):
+    """Return a valve with an effect that does nothing yet."""
+    values = {**base.values, **candidate.neutral}
+    return replace(base, values=values, cost=cost, candidates=(candidate,))
+
+
 @pytest.mark.parametrize(
     ('names', 'before', 'after', 'outcome'),
     [
@@ -430,7 +436,7 @@ def test_a_law_with_one_more_parameter_is_tried_where_the_plain_one_leaves_somet
     fitter, base = fitted(measured(**{'friction_drift.rate': 3.0}))
 
     def screened(fitter, candidate, *rest):
-        return replace(base, cost=left * base.cost, candidates=(candidate,))
+        return beside(base, candidate, left * base.cost)
 
     monkeypatch.setattr(heats, 'screened', screened)
     for how in ('evolve', 'fit', 'refined'):
@@ -470,7 +476,7 @@ def test_what_rests_show_waits_where_another_effect_closes_most(closes, waits, m
 
     def screened(fitter, candidate, *rest):
         done.append(candidate.effect)
-        return replace(base, cost=(1.0 - closes) * base.cost, candidates=(candidate,))
+        return beside(base, candidate, (1.0 - closes) * base.cost)
 
     def evolve(self, valve, *rest):
         done.append('heat')
@@ -516,7 +522,7 @@ def test_where_there_is_no_gap_what_a_base_valve_imitates_is_tried(monkeypatch):
 
     def screened(fitter, candidate, *rest):
         tried.append(candidate.effect)
-        return replace(base, effects=(candidate.effect,), candidates=(candidate,))
+        return beside(base, candidate, base.cost)
 
     monkeypatch.setattr(heats, 'screened', screened)
     monkeypatch.setattr(Fitter, 'residuals', lambda *_: np.random.default_rng(0).normal(size=2000))
@@ -595,7 +601,7 @@ def test_where_nothing_is_left_stribeck_friction_is_sought_beside_a_rare_base_va
 
     def screened(fitter, candidate, *rest):
         tried.append(candidate.effect)
-        return replace(base, cost=1.0, candidates=(candidate,))
+        return beside(base, candidate, 1.0)
 
     monkeypatch.setattr(heats, 'screened', screened)
     monkeypatch.setattr(Fitter, 'evolve', lambda self, valve, *rest: valve)

@@ -173,7 +173,6 @@ class Stretch:
         before, after = np.append(0.0, slopes), np.append(slopes, 0.0)
         least = np.sign(after) * np.minimum(np.abs(before), np.abs(after))
         self.alone[name] = whole, np.where(before * after > 0.0, least, 0.0)
-        self._samples.clear()
         self._grids.clear()
 
     def _alone(self, name: str, now: Array, u: Array, rows: Rows) -> Array:
