@@ -14,16 +14,16 @@ from valve_sim_ros.diagnosis.adequacy import but_one_slip, leftover
 from valve_sim_ros.diagnosis.base_valve import find_base, on_time, starting_valve
 from valve_sim_ros.diagnosis.bench import Bench
 from valve_sim_ros.diagnosis.fitting import Fitter, Valve
-from valve_sim_ros.diagnosis.proof import prove
-from valve_sim_ros.diagnosis.race import race
-from valve_sim_ros.diagnosis.seen import (
+from valve_sim_ros.diagnosis.leaving import (
     drift_seen,
     dwell_seen,
-    shaken_seen,
-    stops_seen,
+    places_seen,
     TOLD_BETTER,
     WANDER,
 )
+from valve_sim_ros.diagnosis.proof import prove
+from valve_sim_ros.diagnosis.race import race
+from valve_sim_ros.diagnosis.seen import shaken_seen, stops_seen
 from valve_sim_ros.diagnosis.stages import groups
 from valve_sim_ros.diagnosis.stretch import CAUGHT
 from valve_sim_ros.diagnosis.unknowns import complete
@@ -64,11 +64,12 @@ def test_rests_of_all_lengths_show_how_friction_grows(which):
     noisy = truth[:3] + 0.2 * rng.standard_normal((3, u.size))
     fitter = Fitter(Bench([Recording(0.2 * np.arange(u.size), u, *noisy)]))
     group, valve = groups(fitter.bench.signals)[-1], Valve(there)
-    law = dwell_seen(fitter.bench, fitter.results(valve))[which]
+    told = dwell_seen(fitter.bench, fitter.results(valve)).starts
+    law = told[which]
     for rest in (5.0, 30.0):
         assert held_after(rest, law) == pytest.approx(held_after(rest, there), rel=0.1)
     dwell = [each for each in group.candidates() if each.effect == 'dwell_friction']
-    suited = [each.suited(dwell_seen(fitter.bench, fitter.results(valve))) for each in dwell]
+    suited = [each.suited(told) for each in dwell]
     assert [len(each) for each in suited] == [1, 3]
 
 
@@ -78,10 +79,10 @@ SHAKES = {'vibration.amplitude': 0.6, 'vibration.frequency': 0.51, 'vibration.ph
 SLOW = {**VALUES, 'T_g1': 6.0, 'T_g2': 8.0, **dict.fromkeys(STARTING, 40.0)}
 
 
-def shaken(effects, **values):
+def shaken(effects, low=30.0, high=60.0, **values):
     """Return the bench of a valve that creeps up and down by small slips behind a slow chamber."""
     rng = np.random.default_rng(5)
-    u = np.repeat(30.0 + 30.0 * rng.random(60), rng.integers(40, 160, 60))
+    u = np.repeat(rng.uniform(low, high, 60), rng.integers(40, 160, 60))
     bench = Bench([Recording(0.2 * np.arange(u.size), u, p1=u)])
     (truth,) = bench.run(complete({**SLOW, **values}), effects)
     noisy = truth[:3] + 0.2 * rng.standard_normal((3, u.size))
@@ -105,10 +106,10 @@ def test_what_holds_the_stem_early_and_late_shows_how_friction_drifts(rate, sett
     there = {'friction_drift.rate': rate, 'friction_drift.settling': settling}
     bench = shaken(('friction_drift',), **there)
     results = bench.run(complete(SLOW))
-    starts = drift_seen(bench, results, scatters=TOLD_BETTER)
-    assert bool(starts) == bool(rate)
+    starts, left = drift_seen(bench, results)
+    assert (left < TOLD_BETTER) == bool(rate)
     # a line is not told from what hardly settles; the best of those that settle comes first
-    for start in starts[bool(settling) : 2]:
+    for start in starts[bool(settling) : 2] if rate else ():
         for time in (0.0, bench.stretches[0].time[-1]):
             held, told = (
                 law['f_s'] * (1.0 + law['friction_drift.rate'] * drifted(time, settles))
@@ -124,7 +125,7 @@ def test_where_the_stem_leaves_its_rests_early_and_late_shows_how_the_sensor_dri
 ):
     there = {'sensor_drift.rate': rate, 'sensor_drift.settling': settling}
     bench = shaken(('sensor_drift',), **there)
-    start = drift_seen(bench, bench.run(complete(SLOW)), WANDER)[bool(settling)]
+    start = drift_seen(bench, bench.run(complete(SLOW)), WANDER).starts[bool(settling)]
     assert start['f_s'] == pytest.approx(VALUES['f_s'], rel=0.1)
     last = bench.stretches[0].time[-1]
     held, told = (
@@ -132,6 +133,24 @@ def test_where_the_stem_leaves_its_rests_early_and_late_shows_how_the_sensor_dri
         for law in (there, start)
     )
     assert told == pytest.approx(held, rel=0.1)
+
+
+@pytest.mark.parametrize('varies', [{'slope': 0.6}, {'height': 0.8, 'centre': 45.0, 'width': 6.0}])
+def test_where_the_stem_leaves_its_rests_shows_how_friction_varies_along_the_stroke(varies):
+    there = {'slope': 0.0, 'height': 0.0, 'centre': 50.0, 'width': 8.0, **varies}
+    there = {f'position_dependent_friction.{name}': value for name, value in there.items()}
+    bench = shaken(('position_dependent_friction',), 25.0, 65.0, **there)
+    (start,) = (
+        each
+        for each in places_seen(bench, bench.run(complete(SLOW))).starts
+        if all(f'position_dependent_friction.{name}' in each for name in varies)
+    )
+    assert start['f_s'] == pytest.approx(VALUES['f_s'], rel=0.1)
+    for name, value in varies.items():
+        told = start[f'position_dependent_friction.{name}']
+        assert told == pytest.approx(value, abs=2.0 if name in ('centre', 'width') else 0.2)
+    even = shaken((), 25.0, 65.0)
+    assert places_seen(even, even.run(complete(SLOW))) == ([], 1.0)
 
 
 @pytest.mark.parametrize('stops', [{}, {'lower': 38.0}, {'upper': 52.0}])

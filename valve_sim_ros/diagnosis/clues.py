@@ -7,19 +7,15 @@ from dataclasses import dataclass, field
 
 from . import odds
 from .fitting import Fitter, Valve
+from .leaving import DRIFT, drift_seen, DWELL, dwell_seen, FORETOLD, PLACES, places_seen, WANDER
 from .seen import (
     calibration_seen,
-    DRIFT,
-    drift_seen,
-    DWELL,
-    dwell_seen,
     friction_seen,
     shaken_seen,
     SHAKES,
     STOPS,
     stops_seen,
     swings_seen,
-    WANDER,
 )
 from .stages import Candidate, Group
 from .starts import friction_grid, grid, START, Starts
@@ -43,6 +39,8 @@ class Clues:
         Values of parameters, by what shows them; see `EffectParameter.shown`.
     told : mapping of str to list of dict
         Starts of whole effects, by their ids, that rests and slips tell.
+    foretold : str
+        The effect with which rests alone make sense, if there is one.
     """
 
     held: float
@@ -50,6 +48,7 @@ class Clues:
     frictions: Starts = field(default_factory=lambda: [{}])
     shown: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
     told: Mapping[str, Starts] = field(default_factory=dict)
+    foretold: str = ''
 
     def own(self, candidate: Candidate) -> Starts:
         """Return the starts that a candidate declares, or values that the record shows."""
@@ -87,6 +86,12 @@ def clues(fitter: Fitter, group: Group, valve: Valve) -> Clues:
         frictions += [{**each, 'f_d1': START['f_d1']} for each in frictions]
     # whole slips would hide a swing
     residual = fitter.residuals(valve, group.signal, (*fitter.drive, RESTS))
+    rests = {
+        **{name: drift_seen(bench, results, name) for name in (DRIFT, WANDER)},
+        DWELL: dwell_seen(bench, results),
+        PLACES: places_seen(bench, results),
+    }
+    best = min(rests, key=lambda name: rests[name].left)
     return Clues(
         held,
         lags,
@@ -98,9 +103,9 @@ def clues(fitter: Fitter, group: Group, valve: Valve) -> Clues:
             **calibration_seen(bench, results),
         },
         told={
-            **{name: drift_seen(bench, results, name) for name in (DRIFT, WANDER)},
-            DWELL: dwell_seen(bench, results),
+            **{name: each.starts for name, each in rests.items()},
             SHAKES: shaken_seen(bench, held),
             STOPS: stops_seen(bench, results),
         },
+        foretold=best if rests[best].left < FORETOLD else '',
     )

@@ -101,10 +101,11 @@ class Heats:
         return not self.group.has_stem or gained >= PROMISING * gap
 
     def screen(self, candidates: Collection[Candidate]) -> list[Valve]:
-        """Return a valve with each candidate after its first refit."""
+        """Return a valve with each candidate that has not begun yet, after its first refit."""
+        begun = [each.candidates[-1] for each in self.ended]
         return self._begin(
             lambda each: screened(self.fitter, each, self.group, self.valve, self.clues),
-            candidates,
+            [each for each in candidates if each not in begun],
         )
 
     def extend(self, plain: Valve, candidates: Collection[Candidate]) -> list[Valve]:

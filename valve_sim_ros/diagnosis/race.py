@@ -70,6 +70,7 @@ def _run(
         [each for each in candidates if each.tier == tier] for tier in range(3)
     )
     if not raced:
+        heats.run(heats.screen([each for each in candidates if each.effect == shown.foretold]))
         _run_quick(heats, quick, imitated)
     elif heats.promising(raced):
         heats.runners = raced
@@ -100,22 +101,27 @@ def _run_quick(heats: Heats, quick: Sequence[Candidate], imitated: Sequence[Cand
     """Run the heats of effects whose search is quick, and of those that a base valve imitates."""
     # what rests show is led by single slips: that waits where others close most without
     told = [each for each in quick if heats.clues.told.get(each.effect)]
-    fresh = heats.screen([each for each in quick if each not in told])
-    if not heats.most(fresh):
+    fresh = heats.screen(_worth([each for each in quick if each not in told], heats))
+    if not heats.most([*heats.ended, *fresh]):
         fresh, told = [*fresh, *heats.screen(told)], []
     heats.run(fresh)
     for some in (told, imitated):
-        # where there is no gap nothing closes it
-        gap = heats.before.excess >= FAINT
-        if gap and heats.runners and heats.nearly_all(best := heats.runners[0]):
-            some = [each for each in some if _like(best, each)]
-        heats.run(heats.screen(some))
+        heats.run(heats.screen(_worth(some, heats)))
+
+
+def _worth(candidates: Sequence[Candidate], heats: Heats) -> Sequence[Candidate]:
+    """Return the candidates that look like one that closes nearly all, all if none does."""
+    # where there is no gap nothing closes it
+    gap = heats.before.excess >= FAINT
+    if gap and heats.runners and heats.nearly_all(best := heats.runners[0]):
+        return [each for each in candidates if _like(best, each)]
+    return candidates
 
 
 def _run_slow(heats: Heats, slow: Sequence[Candidate], *, plainly: bool = False) -> None:
     """Run the heats of effects whose search takes long, as far as the others leave a reason.
 
-    Those begun before are not begun again; `plainly` leaves out laws that have one more parameter.
+    `plainly` leaves out laws that have one more parameter.
     """
     group, valve, left = heats.group, heats.valve, heats.before.excess
     best = next(iter(heats.ended), valve)
@@ -127,8 +133,7 @@ def _run_slow(heats: Heats, slow: Sequence[Candidate], *, plainly: bool = False)
         slow = [each for each in slow if each in hidden or not each.laborious]
     # a law with one more parameter is tried only where the plain one leaves something
     further = [each for each in slow if group.has_stem and each.extends(slow)]
-    begun = [*further, *(each.candidates[-1] for each in heats.ended)]
-    plain = heats.screen([each for each in slow if each not in begun])
+    plain = heats.screen([each for each in slow if each not in further])
     heats.run(plain, last=not (further or plainly))
     if plainly:
         return

@@ -6,16 +6,13 @@ from collections.abc import Sequence
 import math
 
 import numpy as np
-from scipy.optimize import least_squares
 from scipy.signal import periodogram
 
-from ..model.drift import drifted
-from ..model.effects.dwell_friction import SHAPES
 from ..model.pipeline import Array
 from .bench import Bench
+from .leaving import drift_seen, LEAST_LEFT, left, TOLD_BETTER
 from .readings import answers_to_steps
 from .starts import Starts
-from .stretch import Stretch
 
 ENOUGH_STEPS, LEAST_EACH = 6, 2
 """From so many single steps of the command on, so many late and on time tell of mixed arrivals."""
@@ -30,13 +27,6 @@ SPANS = tuple(np.geomspace(0.7, 1.4, 50).tolist())
 """Spans of the sensor that are tried."""
 LEAST_RESTS = 20
 """Samples at rest that show what holds the stem."""
-DWELL, DWELLS, SCATTER = 'dwell_friction', tuple(np.geomspace(0.5, 200.0, 16).tolist()), 0.2
-"""The effect, time constants that are tried [s], and how far what holds the stem scatters [%]."""
-DRIFT, WANDER = 'friction_drift', 'sensor_drift'
-SETTLINGS, TOLD_BETTER, AS_WELL = (0.0, *np.geomspace(2.0, 40.0, 8).tolist()), 0.5, 1.3
-"""The effects, rates at which they settle that are tried [1/h], the part of what scatters that
-one leaves at most that is told by rests alone, and up to how many times the least another rate
-may leave."""
 STOPS, OUTERMOST, BEYOND, LEAST_PRESSED = 'travel_stops', 0.01, 1.0, 5
 """The effect, the share of rests that may lie beyond a stop, by how much more is left unmoved
 there than holds the stem elsewhere [% of span], and samples that show how far one yields."""
@@ -50,8 +40,6 @@ stem than is seen to: starts, too."""
 SLOWEST, QUICKEST, FINENESS, LINE = 0.02, 0.45, 0.1, 3.0
 """Frequencies of a force that shakes the stem: from [Hz] to [1 / period of the samples], in such
 parts of what the record tells apart; and how far a line must stand out (5 in 100 do by chance)."""
-LEAST_LEFT, LEAVES = 6, 4.0
-"""Rests that show friction which grows, and how far a stem is away that has left one [noise]."""
 
 
 def friction_seen(
@@ -84,78 +72,6 @@ def calibration_seen(bench: Bench, results: Sequence[Array]) -> dict[str, tuple[
     return {'zeros': (0.0, -span * middle), 'spans': (1.0, span)}
 
 
-def dwell_seen(bench: Bench, results: Sequence[Array]) -> Starts:
-    """Return starts of a friction that grows with the time at rest, one of each form of its law.
-
-    From what holds the stem when it leaves each rest: static friction and growth are straight in
-    it, the time constant is tried. `results` as for `friction_seen`; none if rests are few.
-    """
-    pairs = zip(bench.stretches, results, strict=True)
-    each = [_rests(bench, s, result) for s, result in pairs]
-    rest, force, _, way = np.concatenate([*each, np.empty((0, 4))]).T
-    force = way * force
-    if rest.size < LEAST_LEFT:
-        return []
-    found = []
-    for shape in SHAPES:
-        best, least = {}, math.inf
-        for time_constant in DWELLS:
-            part = rest / time_constant
-            grown = 1.0 - ((1.0 + shape * part) ** (-1.0 / shape) if shape else np.exp(-part))
-
-            def missing(level: Array, grown: Array = grown) -> Array:
-                return level[0] + level[1] * grown - force
-
-            fit = least_squares(missing, (np.median(force), 0.0), loss='cauchy', f_scale=SCATTER)
-            f_s, more = fit.x
-            if fit.cost < least and f_s > 0.0 and more > 0.0:
-                least = fit.cost
-                values = {'growth': more / f_s, 'time_constant': time_constant, 'shape': shape}
-                best = {'f_s': f_s, **{f'{DWELL}.{name}': v for name, v in values.items()}}
-        found += [best] if best else []
-    return found
-
-
-def drift_seen(
-    bench: Bench, results: Sequence[Array], effect: str = DRIFT, scatters: float = 1.0
-) -> Starts:
-    """Return starts of a friction or a sensor that drifts, at least one for each form of the law.
-
-    From what holds the stem when it leaves each rest: it is straight in the drift, how soon that
-    settles is tried. Friction holds it against its way, a sensor shows more or less either way.
-    `results` as for `friction_seen`; none if more than a part of what scatters is left.
-    """
-    # each stretch begins anew
-    _, force, time, way = _rests(bench, bench.stretches[0], results[0]).T
-    if force.size < LEAST_LEFT:
-        return []
-    turned = way if effect == DRIFT else -np.ones(force.size)
-
-    def fitted(grown: Array) -> tuple[float, float, float]:
-        """Return static friction, the change with what is grown, and what scatters."""
-
-        def missing(level: Array) -> Array:
-            return level[0] + way * level[1] + turned * level[2] * grown - force
-
-        start = (np.median(force), 0.5 * np.ptp(force), 0.0)
-        fit = least_squares(missing, start, loss='cauchy', f_scale=SCATTER)
-        return float(fit.x[1]), float(fit.x[2]), float(fit.cost)
-
-    constant = fitted(np.zeros(time.size))[2]
-    found = []
-    for some in (SETTLINGS[:1], SETTLINGS[1:]):
-        laws = [(*fitted(np.array([drifted(t, k) for t in time])), k) for k in some]
-        laws.sort(key=lambda law: law[2])
-        least = laws[0][2]
-        for f_s, more, left_over, settling in laws if least < scatters * constant else ():
-            # few rests hardly tell how soon it settles
-            if f_s > 0.0 and left_over <= AS_WELL * least:
-                rate = more / f_s if effect == DRIFT else more
-                values = {f'{effect}.rate': rate, f'{effect}.settling': settling}
-                found.append({'f_s': f_s, **values})
-    return found
-
-
 def shaken_seen(bench: Bench, held: float) -> Starts:
     """Return starts of a periodic force on the stem, from the moments at which the stem slips.
 
@@ -172,8 +88,8 @@ def shaken_seen(bench: Bench, held: float) -> Starts:
     stretch = bench.stretches[0]  # the phase counts from the first sample of each
     if not stretch.rests.size or math.isnan(held):
         return []
-    left = _left(bench, stretch)
-    lefts, levels = np.array([each[1] for each in left]), np.array([each[2] for each in left])
+    rests = left(bench, stretch)
+    lefts, levels = np.array([each[1] for each in rests]), np.array([each[2] for each in rests])
     time, x = stretch.time, stretch.measured['x']
     length, period = float(time[-1] - time[0]), float(np.median(np.diff(time)))
     frequencies = np.arange(SLOWEST, QUICKEST / period, FINENESS / length)
@@ -258,41 +174,8 @@ def rests_show(bench: Bench, results: Sequence[Array]) -> bool:
     `results` as for `friction_seen`.
     """
     held = friction_seen(bench, results)[0]
-    drifts = drift_seen(bench, results, scatters=TOLD_BETTER)
+    drifts = drift_seen(bench, results).left < TOLD_BETTER
     return bool(stops_seen(bench, results) or drifts or shaken_seen(bench, held))
-
-
-def _left(bench: Bench, stretch: Stretch) -> list[tuple[int, int, float]]:
-    """Return each rest's first sample, 0 if unknown, the one that has left it, and its level."""
-    x, near = stretch.measured['x'], LEAVES * bench.noise['x']
-    known = np.isfinite(stretch.rests).astype(int)
-    edges = np.flatnonzero(np.diff(known, prepend=0, append=0))
-    found: dict[int, tuple[int, int, float]] = {}
-    for begin, end in zip(edges[::2], edges[1::2], strict=True):
-        level = float(np.median(stretch.rests[begin:end]))
-        away = np.flatnonzero(np.abs(x - level) > near)  # where lost, x is not away
-        before, after = away[away < begin], away[away >= end]
-        if after.size:
-            first = int(before[-1]) + 1 if before.size else 0
-            found[first] = first, int(after[0]), level
-    return list(found.values())
-
-
-def _rests(bench: Bench, stretch: Stretch, result: Array) -> Array:
-    """Return how long each rest lasted, what then held the stem, when, and its way, shape (n, 4).
-
-    In s, % of span (positive if the stem is pushed open), s since the first sample, 1 if it opens
-    and -1 if it closes.
-    """
-    near, time = LEAVES * bench.noise['x'], stretch.time
-    found = []
-    for first, left, level in _left(bench, stretch) if stretch.rests.size else []:
-        last = float(result[1, left - 1 : left + 1].mean())
-        # nobody knows how long the first rest lasts; and a stem may creep with p2
-        if first and abs(last - result[1, first]) > 2.0 * near:
-            way = np.sign(stretch.measured['x'][left] - level)
-            found.append((time[left] - time[first], last - level, time[left] - time[0], way))
-    return np.array(found).reshape(-1, 4)
 
 
 def mixed_arrivals(bench: Bench, results: Sequence[Array]) -> bool:
