@@ -216,6 +216,17 @@ def test_a_play_holds_the_stem_with_less_friction():
     assert slips['f_s'] * (1.0 - slips['f_d/f_s']) == pytest.approx(6.0 * (1.0 - share))
 
 
+def test_a_stem_is_held_the_same_without_a_friction_that_grows_at_rest():
+    _, group, valve = fitter_of()
+    dwell = next(each for each in group.candidates() if each.effect == 'dwell_friction')
+    values = {**valve.values, **dwell.neutral, **DWELL}
+    plain, held = dwell.let_go(values)
+    assert plain['f_s'] == values['f_s']
+    assert held['f_s'] == pytest.approx(1.6 * values['f_s'])
+    assert held['f_s'] * held['f_d/f_s'] == pytest.approx(values['f_s'] * values['f_d/f_s'])
+    assert plain['dwell_friction.growth'] == held['dwell_friction.growth'] == 0.0
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize('draw', [1, 2])
 def test_a_play_larger_than_its_slips_is_found_behind_a_swinging_stem(draw):

@@ -39,11 +39,12 @@ def reconsidered(
         """Return the valve with only one of two effects."""
         valve = replace(
             both,
-            values={**both.values, **other.neutral},
             effects=tuple(name for name in both.effects if name != other.effect),
             candidates=(*base.candidates, one),
         )
-        return fitter.fit(valve, fitter.problem(group, valve))
+        problem = fitter.problem(group, valve)
+        starts = [replace(valve, values=values) for values in other.let_go(both.values)]
+        return min((fitter.fit(start, problem) for start in starts), key=by_cost)
 
     def enough(both: Rung, only: Valve) -> list[Rung]:
         """Return the step to one effect if two are hardly better."""

@@ -101,6 +101,19 @@ class Candidate:
         moves, slips = values['f_s'] * share / f_s, 1.0 - values['f_s'] * (1.0 - share) / f_s
         return [{'f_s': f_s, 'f_d/f_s': min(max(part, 0.0), 1.0)} for part in (moves, slips)]
 
+    def let_go(self, values: Mapping[str, float]) -> Starts:
+        """Return values without the effect: as they are, and with what holds the stem with it.
+
+        The stem moves as it did; the latter only where `balance` is declared.
+        """
+        effect, plain = CATALOGUE[self.effect], {**values, **self.neutral}
+        if effect.balance is None:
+            return [plain]
+        f_s = values['f_s']
+        share = effect.balance(f_s, *(values[f'{effect.id}.{p.name}'] for p in effect.parameters))
+        held = f_s * f_s / share
+        return [plain, {**plain, 'f_s': held, 'f_d/f_s': values['f_d/f_s'] * f_s / held}]
+
 
 def starts_of(parameter: EffectParameter) -> tuple[float, ...]:
     """Return the declared starts, or some around the default on both sides of the neutral."""
