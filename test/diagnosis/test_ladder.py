@@ -3,7 +3,6 @@
 """The rules by which effects are kept, exchanged and called unknown."""
 
 from dataclasses import replace
-from functools import partial
 
 import numpy as np
 import pytest
@@ -16,7 +15,7 @@ from valve_sim_ros.diagnosis.adequacy import Leftover, leftover
 from valve_sim_ros.diagnosis.base_valve import find_base, starting_valve
 from valve_sim_ros.diagnosis.bench import Bench
 from valve_sim_ros.diagnosis.climbing import _final, _let_go, _quickly
-from valve_sim_ros.diagnosis.coarse import COARSE, rounded
+from valve_sim_ros.diagnosis.coarse import COARSE
 from valve_sim_ros.diagnosis.fitting import by_cost, Fitter
 from valve_sim_ros.diagnosis.ladder import climb
 from valve_sim_ros.diagnosis.odds import blurred, explained, imitates, strong, suspicious
@@ -543,24 +542,23 @@ def test_an_effect_found_in_p1_is_not_fitted_anew_to_p2():
     assert found.augmented.values['ip_calibration.span'] == pytest.approx(0.97, abs=0.01)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize('outcome', ['adequate', 'unknown_effect'])
-def test_steps_of_x_are_named_where_no_fit_shows_them(outcome):
+def test_steps_of_x_are_named_by_its_values_alone(monkeypatch):
     """Noise of a third of a step comes out as whole steps, whether the model rounds x or not."""
     record = measured()
     colour = lfilter([1.0], [1.0, -0.8], np.random.default_rng(3).standard_normal(record.x.size))
     step = 0.66
     coarse = step * np.round((simulate(record.u, parameters=VALVE).x + 0.12 * colour) / step)
-    fitter, valve = fitted(Recording(record.time, record.u, record.p1, record.p2, coarse))
-    assert fitter.bench.noise['x'] < 0.1 * step
-    given = Ladder(STEM, outcome, valve, valve, left(50.0), left(50.0))
-    only = [each for each in STEM.candidates() if each.effect == COARSE]
-    again = partial(climb, fitter, STEM, valve, refit=True, progress=lambda share: None, stops=())
-    found = rounded(fitter, given, only, again)
-    assert found.outcome == 'missing_effect'
-    assert [rung.effect for rung in found.rungs] == [COARSE]
-    assert found.valve.values[f'{COARSE}.step'] == pytest.approx(step, rel=1e-3)
-    assert rounded(fitter, found, only, again) == found
+    raced = []
+
+    def noted(fitter, group, *rest, **how):
+        raced.append(group.signal)
+        return race(fitter, group, *rest, **how)
+
+    monkeypatch.setattr('valve_sim_ros.diagnosis.ladder.race', noted)
+    found = diagnose(Recording(record.time, record.u, record.p1, record.p2, coarse))
+    assert [each.rung.effect for each in found.effects] == [COARSE]
+    assert found.augmented.values[f'{COARSE}.step'] == pytest.approx(step, rel=1e-3)
+    assert 'x' not in raced
 
 
 @pytest.mark.slow

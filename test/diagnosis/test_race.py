@@ -12,6 +12,7 @@ from valve_sim_ros.diagnosis import heats, odds
 from valve_sim_ros.diagnosis.adequacy import leftover
 from valve_sim_ros.diagnosis.base_valve import starting_valve
 from valve_sim_ros.diagnosis.bench import Bench
+from valve_sim_ros.diagnosis.clues import clues
 from valve_sim_ros.diagnosis.fitting import FAINT, Fitter
 from valve_sim_ros.diagnosis.race import race
 from valve_sim_ros.diagnosis.stages import groups
@@ -25,7 +26,7 @@ LABORIOUS, QUICK = 'stribeck_friction', 'fluid_force'
 def steps(monkeypatch):
     """Return what names the steps of a race in which each effect closes a share of the gap."""
 
-    def run(closes, gap=50.0, beside=(), sized=(), **how):
+    def run(closes, gap=50.0, beside=(), sized=(), foretold='', **how):
         u = np.repeat(np.random.default_rng(5).uniform(10.0, 90.0, 40), 50)
         s = simulate(u)
         fitter = Fitter(Bench([Recording(s.t, u, s.p1, s.p2, s.x)]))
@@ -57,7 +58,11 @@ def steps(monkeypatch):
         def residuals(self, valve, *rest):
             return noise + misfit * (1.0 - share(valve)) ** 0.5
 
+        def told(*about):
+            return replace(clues(*about), foretold=foretold)
+
         monkeypatch.setattr(heats, 'screened', screened)
+        monkeypatch.setattr('valve_sim_ros.diagnosis.race.clues', told)
         monkeypatch.setattr('valve_sim_ros.diagnosis.race.find_base', found_base)
         for name, search in (('fit', same), ('evolve', same), ('refined', refined)):
             monkeypatch.setattr(Fitter, name, search)
@@ -109,3 +114,19 @@ def test_a_little_that_is_left_is_reason_enough_for_one_that_takes_long(gap, tri
     left, done = steps({LABORIOUS: 0.5, 'spring_preload': 0.1}, gap)
     assert left < odds.SPOTLESS
     assert (left > FAINT) == tried == (LABORIOUS in done)
+
+
+@pytest.mark.parametrize(('closed', 'others'), [(0.9999, False), (0.9, True)])
+def test_a_race_begins_with_what_the_record_itself_tells(closed, others, steps):
+    told = 'sensor_drift'
+    _, done = steps({told: closed, QUICK: 0.5, LABORIOUS: 0.5}, foretold=told, deeply=True)
+    assert done[0] == told
+    assert done.count(told) == 2  # both forms of its law, once
+    assert (QUICK in done) == (LABORIOUS in done) == others
+    assert ('deepened' in done) == others
+
+
+@pytest.mark.parametrize(('part', 'tried'), [(0.95, False), (0.8, True)])
+def test_a_stem_at_the_edge_of_a_step_leaves_more_beside_a_coarse_sensor(part, tried, steps):
+    _, done = steps({odds.COARSE: part, 'linkage_backlash': 0.5}, gap=3.0)
+    assert ('linkage_backlash' in done) == tried

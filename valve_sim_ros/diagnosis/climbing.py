@@ -73,14 +73,19 @@ def climb_all(
         again = partial(
             climbing, refit=True, progress=_within(tell, share + width, 0.0, f'{text} again')
         )
-        # x that keeps to steps is told by these
-        stepped = bool(fitter.bench.grid_of_x[0]) and any(
-            each.effect == odds.COARSE for each in candidates
+        # x that lies on steps is told by these: they are named, and count as noise of the rest
+        stepped = (
+            group.has_stem
+            and fitter.bench.grid_of_x[0] > 0.0
+            and any(each.effect == odds.COARSE for each in candidates)
         )
-        if stepped and group.has_stem:
-            ladder = first(valve, candidates, hastily=True)
-        elif group.has_stem:
-            ladder = _quickly(fitter, valve, candidates, first, again, stops)
+        others = candidates
+        if stepped:
+            fitter.bench.forgive_steps()
+            others = [each for each in candidates if each.effect != odds.COARSE]
+            first, again = partial(first, named=True), partial(again, named=True)
+        if group.has_stem:
+            ladder = _quickly(fitter, valve, others, first, again, stops)
         else:
             ladder = first(valve, candidates)
         if loop and not fitter.drive:
@@ -96,14 +101,13 @@ def climb_all(
                 if each.rungs
             )
             ladder = excused(ladder, plain, carried, sure=sure)
-        if group.has_stem and ladder.complete:
-            again = partial(again, ladder.valve)
-            if stepped:
-                ladder = rounded(fitter, ladder, candidates, again)
-            elif candidates and ladder.outcome == 'unknown_effect':
-                unknown, ladder = ladder, replace(ladder, complete=False)
-                with fitter.ends_at(stops):
-                    ladder = _second_look(fitter, unknown, partial(again, candidates))
+        lost = ladder.outcome == 'unknown_effect'
+        if group.has_stem and others and lost and ladder.complete:
+            unknown, ladder = ladder, replace(ladder, complete=False)
+            with fitter.ends_at(stops):
+                ladder = _second_look(fitter, unknown, partial(again, unknown.valve, others))
+        if stepped and ladder.outcome != 'unknown_effect':
+            ladder = rounded(fitter, ladder, candidates)
         ladders.append(ladder)
         valve = ladder.valve
         if group.signal == 'p1' and dead_time.EFFECT in valve.effects:

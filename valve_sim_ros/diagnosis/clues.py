@@ -3,7 +3,7 @@
 """What a record shows of effects before any search for one: where the searches begin."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from . import odds
 from .fitting import Fitter, Valve
@@ -40,7 +40,7 @@ class Clues:
     told : mapping of str to list of dict
         Starts of whole effects, by their ids, that rests and slips tell.
     foretold : str
-        The effect with which rests alone make sense, if there is one.
+        The effect with which steps or rests of x alone make sense, if there is one.
     """
 
     held: float
@@ -92,6 +92,9 @@ def clues(fitter: Fitter, group: Group, valve: Valve) -> Clues:
         PLACES: places_seen(bench, results),
     }
     best = min(rests, key=lambda name: rests[name].left)
+    foretold = best if rests[best].left < FORETOLD else ''
+    if keeps_to_steps(fitter, group, valve):
+        foretold = odds.COARSE
     return Clues(
         held,
         lags,
@@ -107,5 +110,16 @@ def clues(fitter: Fitter, group: Group, valve: Valve) -> Clues:
             SHAKES: shaken_seen(bench, held),
             STOPS: stops_seen(bench, results),
         },
-        foretold=best if rests[best].left < FORETOLD else '',
+        foretold=foretold,
     )
+
+
+def keeps_to_steps(fitter: Fitter, group: Group, valve: Valve) -> bool:
+    """Tell whether x, where it seems to keep to steps, is better explained by a coarse sensor."""
+    if not group.has_stem:
+        return False
+    effects = tuple(dict.fromkeys((*valve.effects, odds.COARSE)))
+    names = [f'{odds.COARSE}.{name}' for name in ('step', 'offset')]
+    grids = [dict(zip(names, grid, strict=True)) for grid in fitter.bench.grids_of_x]
+    each = [replace(valve, effects=effects, values={**valve.values, **grid}) for grid in grids]
+    return any(fitter.score(one, group.signal, fitter.drive) < valve.cost for one in each)

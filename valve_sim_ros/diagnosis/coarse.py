@@ -6,7 +6,7 @@ Under a noise of a third of a step, rounding what is modelled explains no more o
 round it: nothing but these values shows the steps then.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 import math
 
@@ -14,30 +14,14 @@ from . import odds
 from .adequacy import leftover
 from .fitting import Fitter
 from .odds import COARSE
-from .outcome import concluded, Ladder
+from .outcome import Ladder
 from .readings import OFF
 from .rung import Rung
 from .stages import Candidate
 
 
-def rounded(
-    fitter: Fitter,
-    ladder: Ladder,
-    candidates: Sequence[Candidate],
-    again: Callable[[Sequence[Candidate]], Ladder],
-) -> Ladder:
-    """Return the ladder of an x that has steps with these named, unless the rest is unknown.
-
-    Where x is not explained, its steps are counted as noise and the ladder is climbed `again`.
-    """
-    if COARSE in (rung.effect for rung in ladder.rungs):
-        return ladder
-    if ladder.outcome == 'unknown_effect':
-        fitter.bench.forgive_steps()
-        others = [each for each in candidates if each.effect != COARSE]
-        ladder = concluded(again(others))
-    if ladder.outcome == 'unknown_effect':
-        return ladder
+def rounded(fitter: Fitter, ladder: Ladder, candidates: Sequence[Candidate]) -> Ladder:
+    """Return the ladder of an x that lies on steps with these named, too."""
     offset = fitter.bench.grid_of_x[1]
     candidate = next(
         each

@@ -86,8 +86,9 @@ class Heats:
 
         An effect far larger than usual stands for another, which may not have begun.
         """
-        large = any(odds.too_large(runner, each.effect) for each in runner.candidates[-1:])
-        return not large and odds.nearly_all(self.before, self.left_by(runner))
+        last = runner.candidates[-1].effect if runner.candidates else ''
+        large = last and odds.too_large(runner, last)
+        return not large and odds.nearly_all(self.before, self.left_by(runner), last)
 
     def most(self, runners: Sequence[Valve], part: float = odds.MOSTLY) -> bool:
         """Tell whether the best of these closes most of the gap, or a given part of it."""

@@ -10,6 +10,7 @@ from . import odds
 from .adequacy import but_one_slip, Leftover, leftover
 from .arrivals import put_in_its_period
 from .base_valve import ahead_on_ramps, find_base, on_other_side, on_time, standing_still
+from .clues import keeps_to_steps
 from .fitting import by_cost, Fitter, Valve
 from .loosening import loosened
 from .outcome import Ladder
@@ -87,7 +88,9 @@ def climb(
     def worth(left: Leftover) -> bool:
         if odds.carried_on(left, carried):
             return False
-        if rungs and CATALOGUE[rungs[0].effect].rugged:  # far errors come with every detail missed
+        first = rungs[0].effect if rungs else ''
+        # far errors come with every detail missed, or where x is next to the edge of a step
+        if first == odds.COARSE or (first and CATALOGUE[first].rugged):
             return left.excess >= odds.CLEAN
         if rungs:
             return odds.unfinished(left, odds.MORE_EXCESS)
@@ -112,7 +115,7 @@ def climb(
         if left is not chance and worth(left):
             return candidates
         hidden = group.stages == ('p2-x',) and not (rungs or named or carried > odds.SPOTLESS)
-        stepped = not (rungs or left is chance) and _keeps_to_steps(fitter, group, now)
+        stepped = not (rungs or left is chance) and keeps_to_steps(fitter, group, now)
         return [
             each
             for each in candidates
@@ -266,17 +269,6 @@ def _with_its_own_stem(fitter: Fitter, group: Group, rung: Rung) -> Rung:
     drive = tuple(each for each in fitter.drive if each != HELD)
     after = leftover(fitter.residuals(rung.valve, group.signal, drive))
     return rung if after.excess >= rung.after.excess else _ending(rung, rung.valve, after)
-
-
-def _keeps_to_steps(fitter: Fitter, group: Group, valve: Valve) -> bool:
-    """Tell whether x, where it seems to keep to steps, is better explained by a coarse sensor."""
-    if not group.has_stem:
-        return False
-    effects = tuple(dict.fromkeys((*valve.effects, odds.COARSE)))
-    names = [f'{odds.COARSE}.{name}' for name in ('step', 'offset')]
-    grids = [dict(zip(names, grid, strict=True)) for grid in fitter.bench.grids_of_x]
-    each = [replace(valve, effects=effects, values={**valve.values, **grid}) for grid in grids]
-    return any(fitter.score(one, group.signal, fitter.drive) < valve.cost for one in each)
 
 
 def _imitated(effect: str, base: Valve) -> bool:

@@ -283,9 +283,13 @@ def explained(
     return before.closed_by(after) >= least
 
 
-def nearly_all(before: Leftover, after: Leftover) -> bool:
-    """Tell whether a gap is closed so far that effects that take long are not tried."""
-    return after.excess <= min(CLEAN, NEARLY_ALL * before.excess)
+def nearly_all(before: Leftover, after: Leftover, last: str = '') -> bool:
+    """Tell whether a gap is closed so far that effects that take long are not tried.
+
+    `last` is the effect that was added last.
+    """
+    left = 1.0 - EXPLAINED_BY_STEPS if last == COARSE else NEARLY_ALL
+    return after.excess <= min(CLEAN, left * before.excess)
 
 
 def blurred(valve: Valve, noise: Mapping[str, float]) -> float:

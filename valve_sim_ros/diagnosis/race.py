@@ -70,7 +70,10 @@ def _run(
         [each for each in candidates if each.tier == tier] for tier in range(3)
     )
     if not raced:
-        heats.run(heats.screen([each for each in candidates if each.effect == shown.foretold]))
+        foretold = [each for each in candidates if each.effect == shown.foretold]
+        heats.run(heats.screen(foretold))
+        if deeply and heats.runners and heats.most(heats.runners):
+            heats.runners = _deepened(heats, foretold)
         _run_quick(heats, quick, imitated)
     elif heats.promising(raced):
         heats.runners = raced
