@@ -88,9 +88,9 @@ def climb(
     def worth(left: Leftover) -> bool:
         if odds.carried_on(left, carried):
             return False
-        first = rungs[0].effect if rungs else ''
+        name = rungs[0].effect if rungs else ''
         # far errors come with every detail missed, or where x is next to the edge of a step
-        if first == odds.COARSE or (first and CATALOGUE[first].rugged):
+        if name == odds.COARSE or (name and CATALOGUE[name].rugged):
             return left.excess >= odds.CLEAN
         if rungs:
             return odds.unfinished(left, odds.MORE_EXCESS)
