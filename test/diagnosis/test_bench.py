@@ -266,6 +266,19 @@ def test_a_play_nobody_saw_before_the_record_does_not_reach_p2():
     assert np.nanmax(np.abs(bench.residual(results, 'p2'))) < 5.0
 
 
+@pytest.mark.parametrize('seed', [1, 2, 3, 4])
+def test_a_stem_that_creeps_at_first_is_not_stopped_by_noise_of_p1(seed):
+    levels = ((50, 50.0), (80, 62.4), (400, 67.0), (700, 20.0), (700, 70.0))
+    slow, truth, record = slow_valve(
+        levels, 0.2, T_g1=1.8, T_g2=60.0, f_s=11.0, **{'f_d/f_s': 0.44}
+    )
+    white = np.random.default_rng(seed).standard_normal(record.u.size)
+    p1 = record.p1 + 0.3 * lfilter([0.83], [1.0, -0.55], white)
+    bench = Bench([replace(record, p1=p1)])
+    assert np.ptp(truth.x[:130]) < 8.0  # not so far that plays before the stem are forgotten
+    assert np.nanmax(np.abs(bench.residual(bench.run(complete(slow)), 'x'))) < 6.0
+
+
 @pytest.mark.parametrize('noise', [0.1, 0.3])
 def test_a_stem_that_creeps_at_first_is_not_held_where_it_seems_to_rest(noise):
     levels = ((50, 70.0), (150, 20.0), (700, 90.0))

@@ -27,6 +27,7 @@ from .readings import (
     FEW,
     filled,
     foreseen,
+    forgets,
     grids_kept,
     pace,
     resolution_of,
@@ -50,8 +51,6 @@ MIXED_JITTER = 0.7
 """Uncertainty of the time of a sample then."""
 LEAST_AT_REST = 0.3
 """Share of the samples of p1 that counts even so."""
-TRAVEL, MOST_UNSETTLED = 8.0, 0.1
-"""A record counts once the valve has travelled this far [%], or after this share."""
 SLACK, SLACK_SHARE, EASE = 0.03, 0.01, 10.0
 """By so much p2 may be off where the stem begins to slip [% of span], but by no more than this
 part of the friction: a stem that is nearly free always begins to slip; and how many times as much
@@ -96,29 +95,30 @@ class Bench:
                 values[wild(values, OUTLIER * self.noise[name])] = np.nan
             stretch.noise = {n: self._uncertainty(n, v) for n, v in stretch.measured.items()}
             samples = np.arange(stretch.u.size)
-            # plays and friction forget what was before the record as the valve travels
-            last, surely = self.signals[-1], OUTLIER * self.noise[self.signals[-1]]
-            first = travelled(stretch.measured[last], max(TRAVEL, surely)) + 10
-            settled = samples >= min(first, int(MOST_UNSETTLED * samples.size))
+            far = {name: OUTLIER * self.noise[name] for name in self.signals}
+            last = self.signals[-1]
+            settled = forgets(stretch.measured[last], far[last])
             stretch.recount({n: np.where(settled, v, np.nan) for n, v in stretch.measured.items()})
             if 'p1' in self.signals:
                 whole, noise = filled(stretch.measured['p1']), self.noise['p1']
                 # beside a step nobody knows on which side of the sample it was
                 moves = np.abs(np.diff(whole, prepend=whole[:1], append=whole[-1:])) > STEP * noise
                 known = np.where(moves[:-1] | moves[1:], np.nan, smooth(whole, noise))
+                # no longer: its noise turns p2, and a stem that only creeps stops there
+                settled = forgets(stretch.measured['p1'], far['p1'])
                 stretch.begins['p1'] = np.where(settled, np.nan, known)
             if 'x' in self.signals:
                 whole, noise = filled(stretch.measured['x']), self.noise['x']
                 rests, smoothed = still(whole, noise), smooth(whole, noise)
                 stretch.held = straightened(whole, stretch.u, noise)
                 stretch.rests = np.where(rests, smoothed, np.nan)
-                departed = travelled(stretch.held, surely) or samples.size
+                departed = travelled(stretch.held, far['x']) or samples.size
                 period = float(np.median(np.diff(stretch.time)))
                 stretch.speed = pace(whole, departed, noise) / period
                 if not stretch.speed:  # one that creeps seems to rest
                     if departed < FEW:  # it begins within a slip and rests only then, or creeps
                         rest = departed + FEW
-                        further = travelled(stretch.held[rest:], surely) or samples.size
+                        further = travelled(stretch.held[rest:], far['x']) or samples.size
                         creeps = pace(whole[rest:], further, noise)
                         departed = 0 if creeps else rest + further
                     # a first slip that was seen on its way must not be put to rest there

@@ -42,6 +42,9 @@ FORESEEN, LEAST_SOON, LEAST_SHARE = 0.8, 3, 0.1
 at least, and as a share of all, are no chance."""
 CREEP = 2.0
 """Between two lost commands one that creeps moves by no more than so many times its pace."""
+TRAVEL, FURTHER, MOST_UNSETTLED = 8.0, 10, 0.1
+"""A signal counts once it has travelled so far [%] and so many samples later, or after this share
+of the record."""
 HIGH, LEAST_LINES = 0.25, 32
 """From where on a spectrum tells noise [1 / sample], and frequencies that do."""
 Mask = npt.NDArray[np.bool_]
@@ -155,6 +158,15 @@ def travelled(values: Array, far: float) -> int:
     known = np.flatnonzero(np.isfinite(values))
     moved = np.abs(values[known] - values[known[:1]]) > far
     return int(known[np.argmax(moved)]) if moved.any() else 0
+
+
+def forgets(values: Array, far: float) -> Mask:
+    """Tell at which samples a signal does not show any more what was before its record.
+
+    Plays and friction forget that as it travels; `far` is by how much it has surely moved.
+    """
+    first = travelled(values, max(TRAVEL, far)) + FURTHER
+    return np.arange(values.size) >= min(first, int(MOST_UNSETTLED * values.size))
 
 
 def wild(values: Array, limit: float) -> Mask:
