@@ -105,8 +105,8 @@ class Bench:
                 moves = np.abs(np.diff(whole, prepend=whole[:1], append=whole[-1:])) > STEP * noise
                 known = np.where(moves[:-1] | moves[1:], np.nan, smooth(whole, noise))
                 # no longer: its noise turns p2, and a stem that only creeps stops there
-                settled = forgets(stretch.measured['p1'], far['p1'])
-                stretch.begins['p1'] = np.where(settled, np.nan, known)
+                shown = settled | forgets(stretch.measured['p1'], far['p1'])
+                stretch.begins['p1'] = np.where(shown, np.nan, known)
             if 'x' in self.signals:
                 whole, noise = filled(stretch.measured['x']), self.noise['x']
                 rests, smoothed = still(whole, noise), smooth(whole, noise)
