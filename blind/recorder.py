@@ -5,6 +5,7 @@
 from dataclasses import dataclass, field
 import os
 from pathlib import Path
+import shutil
 
 import numpy as np
 from rosbags.rosbag2 import StoragePlugin, Writer
@@ -157,6 +158,8 @@ def write_bag(
                 messages.append((START + round(time * 1e9), name, value))
     messages.sort(key=lambda each: each[0])
     aside = path.with_name(f'.{path.name}.part')
+    for folder in (aside, path):  # of a smaller set, or of one that was interrupted
+        shutil.rmtree(folder, ignore_errors=True)
     with Writer(aside, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
         connections = {
             name: writer.add_connection(f'/{name}', kind, typestore=store) for name in series

@@ -13,7 +13,7 @@ from blind import records, sets, visibility
 from blind.effects import EFFECTS
 from blind.physics import Physics
 from blind.plant import simulate
-from blind.recorder import Recorder
+from blind.recorder import Recorder, write_bag
 from blind.seal import digest, read_json
 from blind.unknown import UNKNOWN
 from valve_sim_ros import read_recording
@@ -48,6 +48,15 @@ def test_that_no_effect_is_drawn_that_another_valve_imitates(tmp_path):
     key = read_json(tmp_path / 'keys' / '0019.json')
     assert key['effects'] == ['hysteresis']
     assert key['unexplained_in_noise']['hysteresis']['p1'] >= visibility.IMITATED
+
+
+def test_that_a_set_may_grow_over_bags_and_what_an_interruption_left(tmp_path):
+    (tmp_path / '.0008.part').mkdir()
+    t = PERIOD * np.arange(U.size)
+    for x in (U, U + 1.0):
+        write_bag(tmp_path / '0008', t, U, t + 1e-4, {'x': x})
+    assert [each.name for each in tmp_path.iterdir()] == ['0008']
+    np.testing.assert_array_equal(read_recording(tmp_path / '0008').x, U + 1.0)
 
 
 def test_that_the_halves_differ(made, tmp_path):
